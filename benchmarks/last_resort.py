@@ -17,7 +17,9 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
 
-TOOLS = ("direct-cem", "bff", "cetm-flips")
+#: The last one is cetm-flips on the common refinement.
+OVERLAY = "cetm-flips, overlay"
+TOOLS = ("direct-cem", "bff", "cetm-flips", OVERLAY)
 SUFFIXES = (".npz", ".obj", ".ply", ".off")
 LAYOUT = """
 | algorithm | disks | failed | folded | last resort | valid \
@@ -55,12 +57,14 @@ def disks_below(folders: Sequence[Path], faces: int) -> Iterator[DiskMesh]:
 
 def outcome(mesh: DiskMesh, name: str) -> dict[str, Any]:
     """Map a disk, and return what happened to the method's own map and how the map ended."""
-    algorithm = load_registry().algorithm(name)
+    algorithm = load_registry().algorithm(name.partition(",")[0])
+    call = algorithm.refinement if name == OVERLAY else algorithm.function
     try:
-        made = algorithm.function(mesh.fresh(), **algorithm.arguments({}))
+        made = call(mesh.fresh(), **algorithm.arguments({}))
     except AlgorithmFailed:
         return {"failed": True, "valid": False, "folded": False, "resort": False, "cost": None}
     uv, extras = made.uv, made.extras
+    mesh = made.mesh if name == OVERLAY else mesh
     before = extras.get("before_repair", {}).get("angle_error_mean_deg")
     return {
         "failed": "failure" in extras,

@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_100,
     "mesh": 5_950,
     "linear_algebra": 1_500,
-    "conformal": 5_750,
+    "conformal": 5_850,
     "registry": 950,
     "results": 4_550,
     "running": 7_250,

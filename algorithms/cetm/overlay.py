@@ -244,23 +244,18 @@ def _triangles(cell: Sequence[int], V: Real, uv: Complex) -> list[tuple[int, ...
     return fan(0) if len(cell) == 3 else fan(max(range(len(cell)), key=least))
 
 
-def _straight(paths: Crossings, T: Triangulation) -> dict[tuple[int, ...], list[Place]]:
-    """Return where straight lines in flat triangles cross their edges, by their crossings.
-
-    Each on the line and on the edge, in (0, 1).
-    """
-    found = {}
+def _straight(paths: Crossings, T: Triangulation) -> dict[int, Place]:
+    """Return where straight lines in flat triangles cross their edges, by their crossings."""
+    found: dict[int, Place] = {}
     length = np.exp(T.log_length).tolist()
     for path, behind in _behind(paths, T):
         ends = _unfolded(T, length, behind)
         q = ends.pop()[0]
-        places = []
         for x, (a, b) in zip(path, ends, strict=True):
             left, right = (q.conjugate() * a).imag, (q.conjugate() * b).imag
             s = left / (left - right) if left != right else np.nan
             t = ((a + s * (b - a)) / q).real
-            places.append((t, s if paths.side[x] > 0 else 1 - s))
-        found[tuple(path)] = places
+            found[x] = t, s if paths.side[x] > 0 else 1 - s
     return found
 
 
@@ -307,43 +302,62 @@ def _tip(a: complex, b: complex, from_a: float, from_b: float) -> complex:
 
 
 def _places(
-    paths: Crossings, flat: Uniformised, straight: dict[tuple[int, ...], list[Place]]
+    paths: Crossings, flat: Uniformised, straight: dict[int, Place]
 ) -> tuple[dict[int, float], dict[int, float]]:
     """Return where each crossing lies on its given edge and on its flipped one, in (0, 1).
 
-    A given edge whose crossings are still those of a straight line keeps them, on flipped edges in
-    the projective map that scales the vertices; others, and those of which an edge would lose its
-    order, get the crossings of geodesics.
+    Crossings with straight lines keep their places, on flipped edges in the projective map that
+    scales the vertices. Others have those of geodesics, moved with the former.
     """
     T, u = flat.T, flat.u
     F, log_length = T.F.ravel().tolist(), T.log_length.tolist()
     on_given: dict[int, float] = {}
     on_flipped: dict[int, float] = {}
-    by_lines: dict[int, float] = {}
+    scaled: dict[int, float] = {}
     for path, behind in _behind(paths, T):
-        lines = straight.get(tuple(path))
         from_p = _distances(T, log_length, behind)
         ahead = [int(T.twin[h]) for h in behind[::-1]]
         from_q = [(b, a) for a, b in _distances(T, log_length, ahead)][::-1]
-        for k, (x, h, p, q) in enumerate(zip(path, behind, from_p, from_q, strict=True)):
+        for x, h, p, q in zip(path, behind, from_p, from_q, strict=True):
             # p and q: log lengths from the ends of the path to the start and the end of h.
             a, b = F[h], F[h - h % 3 + (h % 3 + 1) % 3]
             share = _share(u[a] + p[0] + q[0], u[b] + p[1] + q[1])
             on_given[x] = _share(p[0] + p[1], q[0] + q[1])
             on_flipped[x] = share if paths.side[x] > 0 else 1 - share
-            if lines is not None:
-                s = lines[k][1]
+            if x in straight:
+                s = straight[x][1]
                 start, end = (a, b) if paths.side[x] > 0 else (b, a)
-                scale = np.exp(np.clip(u[end] - u[start], -700, 700))
-                by_lines[x] = s / (s + (1 - s) * scale)
-        if lines is not None and _apart([t for t, _ in lines]):
-            on_given |= {x: t for x, (t, _) in zip(path, lines, strict=True)}
-        _spread(path, on_given)
+                scaled[x] = s / (s + (1 - s) * float(np.exp(np.clip(u[end] - u[start], -700, 700))))
+        _put(path, on_given, {x: straight[x][0] for x in path if x in straight})
     for there in paths.on_edge:
-        if _apart([by_lines.get(x, on_flipped[x]) for x in there]):
-            on_flipped |= {x: by_lines[x] for x in there if x in by_lines}
-        _spread(there, on_flipped)
+        _put(there, on_flipped, {x: scaled[x] for x in there if x in scaled})
     return on_given, on_flipped
+
+
+def _put(order: Sequence[int], places: dict[int, float], known: dict[int, float]) -> None:
+    """Move crossings on an edge so that some have known places, if all stay in order.
+
+    Those that are not apart in order, known or not, are spread evenly.
+    """
+    if known and _apart(list(known.values())) and _apart([places[x] for x in order]):
+        x, y = (np.array([_logit(some[k]) for k in known]) for some in (places, known))
+        for k in order:
+            at = _logit(places[k])
+            nearest = float(np.clip(at, x[0], x[-1]))
+            moved = float(np.interp(nearest, x, y)) + at - nearest
+            places[k] = known.get(k, _share(moved, 0.0))
+    if not _apart([places[x] for x in order]):
+        places |= {x: k / (len(order) + 1) for k, x in enumerate(order, 1)}
+
+
+def _apart(places: Sequence[float]) -> bool:
+    """Whether places are in order and distinct in (0, 1)."""
+    return bool((np.diff([0.0, *places, 1.0]) > LEAST).all())
+
+
+def _logit(share: float) -> float:
+    """Return the number whose share of it and 0 is this, by :func:`_share`."""
+    return float(np.log(share / (1 - share)))
 
 
 def _distances(
@@ -369,17 +383,6 @@ def _distances(
             far = np.logaddexp(log_length[h] + pa, other + pb) - following
             found.append((float(far), pb))
     return found
-
-
-def _apart(places: Sequence[float]) -> bool:
-    """Whether places are in order and distinct in (0, 1)."""
-    return bool((np.diff([0.0, *places, 1.0]) > LEAST).all())
-
-
-def _spread(order: Sequence[int], places: dict[int, float]) -> None:
-    """Give crossings in order on an edge even places where theirs are not apart in order."""
-    if not _apart([places[x] for x in order]):
-        places |= {x: k / (len(order) + 1) for k, x in enumerate(order, 1)}
 
 
 def _share(x: float, y: float) -> float:

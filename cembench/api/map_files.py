@@ -102,8 +102,8 @@ def map_files(
     preview : bool
         Draw a PNG beside the output; folded triangles are red.
     certificate : bool
-        Enclose the conformal modulus of each disk between four boundary points, which a conformal
-        map keeps, and compare the map's. Takes two solves.
+        Enclose the conformal modulus of each disk between four boundary points, or of a surface
+        with one hole, which a conformal map keeps, and compare the map's. Takes two solves.
     keep_invalid : bool
         Write invalid maps too.
     overwrite : bool

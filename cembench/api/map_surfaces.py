@@ -17,7 +17,7 @@ from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
-from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here
@@ -213,12 +213,10 @@ class Maps:
 
 def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
     """Return what the bounds of the surface's modulus say of a map."""
-    from cembench.conformal.certificate import certify
+    from cembench.conformal.certificate import certificate_of
 
-    if record.target != "disk" or not isinstance(mesh, DiskMesh):
-        return "only for maps of disks to the disk"
     try:
-        found = certify(mesh)
+        found = certificate_of(mesh, uv, record.target)
     except AlgorithmFailed as error:
         return f"none: {error}"
-    return found.words(uv[found.corners])
+    return "only for maps to the disk" if found is None else found.words(uv[found.corners])

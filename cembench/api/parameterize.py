@@ -174,9 +174,10 @@ class Result:
     def certificate(self) -> Certificate:
         """Enclose the conformal modulus of the surface, which the map should have.
 
-        Four boundary points make a disk a quadrilateral. Two harmonic functions enclose its
-        modulus from both sides without a known map, and every conformal map keeps it. A map whose
-        modulus is outside is not conformal; one within may still be wrong elsewhere.
+        Four boundary points make a disk a quadrilateral; a surface with one hole has a modulus of
+        its own. Two harmonic functions enclose it from both sides without a known map, and every
+        conformal map keeps it. A map whose modulus is outside is not conformal; one within may
+        still be wrong elsewhere.
 
         Returns
         -------
@@ -186,9 +187,9 @@ class Result:
         Raises
         ------
         ParameterError
-            The map is not one of a disk to the disk.
+            The map is not one to the disk.
         AlgorithmFailed
-            The boundary has fewer than four vertices.
+            The boundary has fewer than four vertices, or the surface several holes.
 
         Examples
         --------
@@ -199,14 +200,15 @@ class Result:
         True
 
         """
-        from cembench.conformal.certificate import certify
+        from cembench.conformal.certificate import certificate_of
 
-        if self.algorithm.target != "disk" or not isinstance(self.mesh, DiskMesh):
+        found = certificate_of(self.mesh, self.z, self.algorithm.target)
+        if found is None:
             raise ParameterError(
-                f"{self.algorithm.name} on {self.mesh.name} is no map of a disk to the disk, whose "
-                "modulus is known. Take an algorithm for disks."
+                f"{self.algorithm.name} on {self.mesh.name} is no map to the disk, whose modulus "
+                "is known. Take an algorithm for disks, or for holes."
             )
-        return certify(self.mesh)
+        return found
 
     def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
         """Return the surface sampled on a regular grid of the map.

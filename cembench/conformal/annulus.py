@@ -10,6 +10,8 @@ Computational Conformal Geometry, harmonic 1-forms).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -64,6 +66,61 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     True
 
     """
+    ring = conjugate_pair(mesh, outer, hole)
+    u, v, b = ring.u, ring.v, np.concatenate([outer, hole])
+    lifted, paths = v[ring.cut.origin] + ring.jump, ring.paths
+    goals = _increasing(lifted[paths[0]]), -_increasing(-lifted[paths[1]])
+    moved = np.concatenate(goals) - np.concatenate([lifted[path[:-1]] for path in paths])
+    if np.abs(moved).max() > 0:
+        by_vertex = np.zeros(mesh.n)
+        by_vertex[np.concatenate([ring.cut.origin[path[:-1]] for path in paths])] = moved
+        v = v + ring.extension(by_vertex[b])
+    modulus = 2 * np.pi / ring.capacity
+    if not modulus < DEEPEST:
+        raise AlgorithmFailed(
+            f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
+            "surface with a free boundary"
+        )
+    image: Complex = np.exp(-modulus * u + 1j * v)
+    return image
+
+
+@dataclass(frozen=True)
+class ConjugatePair:
+    """A harmonic function on a surface with one hole, and its conjugate.
+
+    Parameters
+    ----------
+    u : float (n,)
+        0 on the outer boundary, 1 on the hole.
+    v : float (n,)
+        With `jump` added on the cut surface, an angle that grows by 2 pi around the hole.
+    cut : Cut
+        The surface cut open between its boundaries.
+    jump : float (n',)
+        2 pi on one bank of the cut, else 0.
+    paths : tuple of int64 arrays
+        Both boundaries on the cut surface, from one bank to the other.
+    extension : HarmonicExtension
+        Of values on both boundaries, the outer one first.
+    capacity, circulation : float
+        The Dirichlet energies of both: upper bounds of 2 pi / h and 2 pi h for the annulus with
+        radii 1 and exp(-h).
+
+    """
+
+    u: NDArray[np.float64]
+    v: NDArray[np.float64]
+    cut: Cut
+    jump: NDArray[np.float64]
+    paths: tuple[Loop, Loop]
+    extension: HarmonicExtension
+    capacity: float
+    circulation: float
+
+
+def conjugate_pair(mesh: HoledMesh, outer: Loop, hole: Loop) -> ConjugatePair:
+    """Return the potential between both boundaries, and its conjugate; as :func:`annulus_map`."""
     with phase("boundary"):
         cut = cut_open(mesh)
         paths = _rims(cut, outer, hole)
@@ -81,21 +138,8 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     v = np.zeros(mesh.n)
     v[others] = Cholesky(L[others][:, others]).solve(-(glue.T @ (L_cut @ jump))[others])
     lifted = v[cut.origin] + jump
-    goals = _increasing(lifted[paths[0]]), -_increasing(-lifted[paths[1]])
-    moved = np.concatenate(goals) - np.concatenate([lifted[path[:-1]] for path in paths])
-    if np.abs(moved).max() > 0:
-        at = np.concatenate([cut.origin[path[:-1]] for path in paths])
-        by_vertex = np.zeros(mesh.n)
-        by_vertex[at] = moved
-        v += extension(by_vertex[b])
-    modulus = 2 * np.pi / (u @ (L @ u))
-    if not modulus < DEEPEST:
-        raise AlgorithmFailed(
-            f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
-            "surface with a free boundary"
-        )
-    image: Complex = np.exp(-modulus * u + 1j * v)
-    return image
+    energies = float(u @ (L @ u)), float(lifted @ (L_cut @ lifted))
+    return ConjugatePair(u, v, cut, jump, paths, extension, *energies)
 
 
 def _rims(cut: Cut, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:

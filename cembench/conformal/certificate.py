@@ -15,10 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.conformal.annulus import conjugate_pair
 from cembench.conformal.harmonic import edge_lengths, harmonic_extension
 from cembench.conformal.laplacian import laplacian
+from cembench.conformal.planar import fitted_circle, polygon_area
 from cembench.core.errors import AlgorithmFailed
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 Complex = NDArray[np.complex128]
 
@@ -68,12 +70,16 @@ class Certificate:
 
         z (4,) are the images of the corners, on the unit circle; NaN if they are not in order.
         """
-        return disk_modulus(z) / self.modulus - 1
+        return self.of_map(z) / self.modulus - 1
+
+    def of_map(self, z: Complex) -> float:
+        """Return the modulus of a map to the disk, z (4,) as in :meth:`off`."""
+        return disk_modulus(z)
 
     def words(self, z: Complex) -> str:
         """Return what the bounds say of a map to the disk, z (4,) as in :meth:`off`."""
         bounds = f"between {self.lower:.5g} and {self.upper:.5g}"
-        own = disk_modulus(z)
+        own = self.of_map(z)
         if not np.isfinite(own):
             return f"the surface's modulus is {bounds}; the map's corners are not in order"
         place = "within" if self.encloses(z) else f"{abs(self.off(z)):.2%} off, outside"
@@ -81,7 +87,69 @@ class Certificate:
 
     def encloses(self, z: Complex) -> bool:
         """Whether the modulus of the corners' images z (4,) lies between the two bounds."""
-        return self.lower <= disk_modulus(z) <= self.upper
+        return self.lower <= self.of_map(z) <= self.upper
+
+
+@dataclass(frozen=True)
+class RingCertificate(Certificate):
+    """The modulus of a surface with one hole, with bounds: log(1 / r) / 2 pi if that has radius r.
+
+    `corners` are the vertices of the hole, `upper` and `conjugate` come from the angle around it
+    and from the potential between the boundaries.
+    """
+
+    def of_map(self, z: Complex) -> float:
+        """Return the modulus of the unit disk without the circle through z (k,)."""
+        centre, radius = fitted_circle(z)
+        wide = (1 + radius**2 - abs(centre) ** 2) / (2 * radius)
+        return float(np.arccosh(wide) / (2 * np.pi)) if wide >= 1 else float("nan")
+
+    def words(self, z: Complex) -> str:
+        """Return what the bounds say; the circle is that of the polygon's vertices, a bit large."""
+        return super().words(z).removesuffix(", outside")
+
+
+def certificate_of(mesh: TriangleMesh, z: Complex, target: str) -> Certificate | None:
+    """Return the bounds for a map z (n,) of this target; None if it is not one with bounds.
+
+    Raises
+    ------
+    AlgorithmFailed
+        The boundary has fewer than four vertices, or there are several holes.
+
+    """
+    if target == "disk" and isinstance(mesh, DiskMesh):
+        return certify(mesh)
+    if target == "circular holes" and isinstance(mesh, HoledMesh):
+        return certify_ring(mesh, int(max(mesh.loops, key=lambda loop: polygon_area(z[loop]))[0]))
+    return None
+
+
+def certify_ring(mesh: HoledMesh, outer: int | None = None) -> RingCertificate:
+    """Enclose the modulus of a surface with one hole by two conjugate harmonic functions.
+
+    `outer` is a vertex of the outer boundary (default: of the widest).
+
+    Raises
+    ------
+    AlgorithmFailed
+        The surface has more than one hole.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> found = certify_ring(cembench.surface("catenoid-ring", 2000))
+    >>> found.lower < found.upper, abs(2 * np.pi * found.modulus - 1) < 1e-3
+    (True, True)
+
+    """
+    boundary, holes = mesh.outer_and_holes(outer)
+    if len(holes) != 1:
+        raise AlgorithmFailed(
+            f"{mesh.name} has {len(holes)} holes; bounds are known for a disk or one hole"
+        )
+    pair = conjugate_pair(mesh, boundary, holes[0])
+    return RingCertificate(holes[0], pair.circulation / (4 * np.pi**2), pair.capacity)
 
 
 def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certificate:

@@ -264,7 +264,7 @@ def test_a_map_is_compared_with_the_bounds_of_the_modulus():
     assert proof.words(np.exp([0, 2j, 3j, 4j])).endswith("outside")
     assert "not in order" in proof.words(good.z[proof.corners[::-1]])
     free = cembench.parameterize(good.mesh, "lscm")
-    with pytest.raises(cembench.ParameterError, match="no map of a disk to the disk"):
+    with pytest.raises(cembench.ParameterError, match="no map to the disk"):
         free.certificate()
 
 
@@ -273,7 +273,7 @@ def test_map_tells_the_certificate(tmp_path):
     (mapped,) = cembench.map_files([tmp_path / "a.obj"], certificate=True)
     assert mapped.certificate.endswith("within")
     (mapped,) = cembench.map_files([tmp_path / "a.obj"], "lscm", certificate=True)
-    assert mapped.certificate == "only for maps of disks to the disk"
+    assert mapped.certificate == "only for maps to the disk"
     (mapped,) = cembench.map_files([tmp_path / "a.obj"])
     assert mapped.certificate == ""
 

@@ -9,8 +9,9 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 from scipy import integrate
 
+import cembench
 from cembench import DiskMesh
-from cembench.conformal.certificate import certify, disk_modulus, four_points
+from cembench.conformal.certificate import certify, certify_ring, disk_modulus, four_points
 from cembench.conformal.moebius import Moebius
 from cembench.core.errors import AlgorithmFailed
 from tests import gallery
@@ -128,3 +129,26 @@ def test_the_four_points_follow_the_geometry_and_are_apart():
     square = DiskMesh.from_arrays(np.stack([9 * j, i, 0 * i], 1).astype(float), F)
     assert len(set(four_points(square))) == 4
     assert certify(square, np.array([0, 1, 3, 2])).upper == pytest.approx(9)
+
+
+def test_a_ring_s_modulus_is_enclosed_and_the_bounds_close_at_second_order():
+    widths = []
+    for faces in (500, 8000):
+        ring = cembench.surface("catenoid-ring", faces)
+        found = certify_ring(ring)
+        assert found.lower < found.upper
+        assert found.modulus == pytest.approx(1 / (2 * np.pi), rel=0.01)
+        widths.append(found.reciprocal_error)
+    assert np.log2(widths[0] / widths[1]) / 2 == pytest.approx(2, abs=0.3)
+
+
+def test_a_ring_s_map_is_compared_whatever_its_centre_and_several_holes_have_no_bounds():
+    result = cembench.parameterize(cembench.surface("catenoid-ring", 2000))
+    proof = result.certificate()
+    assert abs(proof.off(result.z[proof.corners])) < 0.005
+    assert "off" in proof.words(result.z[proof.corners])
+    circle = np.exp(2j * np.pi * np.arange(12) / 12)
+    moved = (0.4 * circle - 0.3) / (1 - 0.3 * 0.4 * circle)
+    assert proof.of_map(moved) == pytest.approx(proof.of_map(0.4 * circle))
+    with pytest.raises(AlgorithmFailed, match="3 holes"):
+        certify_ring(gallery.three_holes())
