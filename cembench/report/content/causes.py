@@ -52,7 +52,7 @@ def with_causes(evidence: Evidence, frame: pd.DataFrame) -> pd.DataFrame:
     crowding = {key: one.crowding for key, one in evidence.difficulties.items()}
     facts = pd.DataFrame.from_dict(shapes, orient="index", dtype=float)
     names = ["obtuse_share", "chord_share", "angle_defect", "boundary_excess"]
-    found = frame.join(facts.reindex(columns=names), on="mesh_hash")
+    found = frame.join(facts.reindex(columns=names), on="mesh_hash").copy()  # in one piece
     valid = found[ANGLE].where(found["ok"])
     found = found.assign(
         boundary_crowding=found["mesh_hash"].map(crowding).astype(float),
