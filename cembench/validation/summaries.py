@@ -15,10 +15,12 @@ from cembench.validation.verdict import STAGES, Validation, sentence
 
 #: How a file of ours begins, after the declaration of XML.
 _OURS = b'<testsuites name="cembench validate"'
+#: The stages whose tables come last in a summary: what they found is in the verdict if it is bad.
+_CHECKS = ("contract", "correctness")
 
 
 def append_markdown(validation: Validation, path: Path) -> None:
-    """Append the verdict and its tables to a file of Markdown.
+    """Append the verdict and its tables to a file of Markdown, the comparisons first.
 
     Raises
     ------
@@ -28,9 +30,10 @@ def append_markdown(validation: Validation, path: Path) -> None:
     """
     sign = "✅" if validation.passed else "❌"
     title = f"{sign} {validation.title}: {'passed' if validation.passed else 'did not pass'}"
-    stages = tuple(section for section in stage_sections(validation, {}) if section.items)
+    stages = [section for section in stage_sections(validation, {}) if section.items]
+    stages.sort(key=lambda section: section.name in _CHECKS)
     verdict = Text(f"{sentence(validation)}.")
-    append_section(path, Section("validation", title, (verdict,), stages))
+    append_section(path, Section("validation", title, (verdict,), tuple(stages)))
 
 
 def check_junit(path: Path) -> None:
