@@ -77,6 +77,7 @@ def valid_with_holes(
     in_patches = folded <= MOST_FOLDED * mesh.m or not last_resort
     repaired, extras = accepted_repair(mesh, turned, repair=repair and in_patches)
     extras["folded_before_repair"] = folded
+    extras["fold_repairs"] += int(turned is not own)
     if not last_resort or not (folded or _cross(own, loops)):
         return repaired, extras
     extras["before_repair"] = figures(mesh, own, folded)
@@ -87,6 +88,7 @@ def valid_with_holes(
     opened = opened_disk(mesh, loops[1:])
     with phase("folds"):
         if _cost(mesh, loops, opened) < cost:
+            extras["fold_repairs"] += 1
             return opened, extras | {"last_resort": {"opened_holes": len(loops) - 1}}
     return repaired, extras
 
