@@ -22,18 +22,19 @@ OTHER = "other"
 
 @dataclass
 class _Ledger:
-    """The seconds of each phase, and the stack of open phases."""
+    """The seconds of each phase by a clock, and the stack of open phases.
 
+    The clock is bound when the ledger is made, so replacing it in a module has no effect.
+    """
+
+    clock: Callable[[], float]
     seconds: dict[str, float] = field(default_factory=dict)
     stack: list[str] = field(default_factory=lambda: [OTHER])
-    since: float = field(default_factory=perf_counter)
+    since: float = 0.0
 
-    def book(self, clock: Callable[[], float] = perf_counter) -> None:
-        """Credit the time since the last change to the phase on top of the stack.
-
-        The clock is bound here, so replacing it in a module has no effect.
-        """
-        now = clock()
+    def book(self) -> None:
+        """Credit the time since the last change to the phase on top of the stack."""
+        now = self.clock()
         name = self.stack[-1]
         self.seconds[name] = self.seconds.get(name, 0.0) + now - self.since
         self.since = now
@@ -90,7 +91,7 @@ def phase(name: str) -> Iterator[None]:
 
 def measure(call: Callable[[], T], clock: Callable[[], float] = perf_counter) -> tuple[T, Timing]:
     """Call once; return the result and the seconds of the call, by phase."""
-    ledger = _Ledger()
+    ledger = _Ledger(clock)
     token = _ledger.set(ledger)
     try:
         ledger.since = clock()
