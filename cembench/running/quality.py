@@ -35,7 +35,7 @@ Complex = NDArray[np.complex128]
 #: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
 FAR = 2.0
 #: Below this mean angle error, in degrees, none is, so a large smooth surface needs no yardstick.
-CLOSE = 0.1
+CLOSE = 0.25
 #: So is a map above this share of the mean angle error of collapsed triangles, or above this number
 #: of degrees; the yardstick may be as bad there.
 COLLAPSED, POOR = 0.25, 10.0
