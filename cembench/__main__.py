@@ -8,8 +8,9 @@ import sys
 def main() -> None:
     """Load and run the command line."""
     try:
-        from cembench.commands.cli import main as run
+        from cembench.commands.app import load, run
 
+        load(*sys.argv[1:2])
         run()
     except KeyboardInterrupt:
         sys.stderr.write("Stopped.\n")

@@ -6,25 +6,12 @@ Other codes (a closed pipe, a signal, a fault of cembench itself) are in
 
 from __future__ import annotations
 
-from importlib import import_module
+from cembench.commands.app import app, load
+from cembench.commands.app import run as main
 
-from cembench.commands.app import app
-from cembench.commands.exit_codes import ending
+__all__ = ["app", "main"]
 
-#: The modules that add commands to the application, in the order of the help.
-MODULES = (
-    *("catalogue", "map", "benchmark", "reproduce", "report", "run", "submit"),
-    *("validate", "peers", "holes", "theory", "morph", "fetch", "repair", "cut"),
-)
-for _name in MODULES:
-    import_module(f"cembench.commands.{_name}")
-
-
-def main() -> None:
-    """Run the command line; :mod:`cembench.commands.exit_codes` chooses the exit code."""
-    with ending():
-        app()
-
+load()
 
 if __name__ == "__main__":
     main()

@@ -24,9 +24,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse import csgraph
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError
@@ -170,15 +169,17 @@ class _Net:
         """Add vertices, each as far as possible from the previous ones."""
         graph = self._distances()
         if not points:
-            points = [int(np.argmax(csgraph.dijkstra(graph, indices=0)))]
+            points = [int(np.argmax(scipy.sparse.csgraph.dijkstra(graph, indices=0)))]
         while len(points) < count:
-            away = csgraph.dijkstra(graph, indices=points, min_only=True)
+            away = scipy.sparse.csgraph.dijkstra(graph, indices=points, min_only=True)
             points = [*points, int(np.argmax(away))]
         return points
 
     def cut_graph(self, root: int, marks: frozenset[int]) -> frozenset[int]:
         """Return a tree-cotree cut graph that reaches these vertices."""
-        away, before = csgraph.dijkstra(self._distances(), indices=root, return_predecessors=True)
+        away, before = scipy.sparse.csgraph.dijkstra(
+            self._distances(), indices=root, return_predecessors=True
+        )
         child = np.flatnonzero(before >= 0)
         in_tree = np.zeros(len(self.edges), dtype=bool)
         in_tree[self._between(child, before[child])] = True
@@ -207,7 +208,7 @@ class _Net:
         keys = self.edges[:, 0] * self.n + self.edges[:, 1]
         return np.searchsorted(keys, np.minimum(i, j) * self.n + np.maximum(i, j))
 
-    def _distances(self) -> sparse.csr_array:
+    def _distances(self) -> scipy.sparse.csr_array:
         """Return the weighted edge graph; boundary edges cost almost nothing, as they are open."""
         weights = np.where(self.rim, 1e-9 * self.lengths.mean(), self.lengths)
         return _graph(self.edges, weights, self.n)
@@ -220,7 +221,9 @@ class _Net:
         cost = np.where(in_tree[number], 2 * most, most - loop_length)
         m = len(self.F)
         i, j = np.sort(self.pairs // 3, axis=1).T
-        tree = csgraph.minimum_spanning_tree(sparse.coo_array((cost, (i, j)), shape=(m, m)))
+        tree = scipy.sparse.csgraph.minimum_spanning_tree(
+            scipy.sparse.coo_array((cost, (i, j)), shape=(m, m))
+        )
         chosen = tree.tocoo()
         keys = i * m + j
         order = np.argsort(keys)
@@ -230,12 +233,12 @@ class _Net:
         return crossed
 
 
-def _graph(edges: Indices, weights: Points, n: int) -> sparse.csr_array:
+def _graph(edges: Indices, weights: Points, n: int) -> scipy.sparse.csr_array:
     """Return the symmetric weighted graph of edges (k, 2) on n vertices."""
     i, j = edges.T
     both = np.concatenate([weights, weights])
     ends = (np.concatenate([i, j]), np.concatenate([j, i]))
-    return sparse.coo_array((both, ends), shape=(n, n)).tocsr()
+    return scipy.sparse.coo_array((both, ends), shape=(n, n)).tocsr()
 
 
 def _neighbours(net: _Net, graph: Iterable[int]) -> dict[int, list[Edge]]:
@@ -339,7 +342,7 @@ def _shortest_arc(
         sides = edge.reshape(-1, 3)
         beside = np.unique(sides[(faces[sides] == 1).any(axis=1)])
         lengths[beside] += lengths.sum()  # longer than any other path
-    away, before, source = csgraph.dijkstra(
+    away, before, source = scipy.sparse.csgraph.dijkstra(
         _graph(edges, lengths, n), indices=sources, min_only=True, return_predecessors=True
     )
     reached = away[targets]

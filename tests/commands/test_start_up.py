@@ -6,6 +6,8 @@ import sys
 import pytest
 
 import cembench
+from cembench.commands import cli
+from cembench.commands.app import MODULES
 
 #: Each takes a tenth of a second to load, or more.
 SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
@@ -37,6 +39,20 @@ def command(*words):
 def test_a_help_text_needs_no_numerical_library(words):
     # Where a command has options, the library of the command line loads pydantic.
     assert loaded(command(*words)) <= {"pydantic"}
+
+
+def test_a_command_line_loads_the_module_of_its_command():
+    start = "from cembench.commands.app import load; load('cut')"
+    names = [f"cembench.commands.{module}" for module in MODULES]
+    code = f"import sys; {start}; print(*[n for n in {names!r} if n in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "cembench.commands.cut" in done.stdout.split()
+    assert not {"cembench.commands.map", "cembench.commands.run"} & set(done.stdout.split())
+
+
+def test_the_modules_name_all_commands():
+    known = [one.name or one.callback.__name__ for one in cli.app.registered_commands]
+    assert known == [verb for verbs in MODULES.values() for verb in verbs]
 
 
 def test_a_list_needs_no_scipy_and_no_records():
