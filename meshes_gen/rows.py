@@ -1,4 +1,4 @@
-"""The models of the installed papers with their counts, which the stand-ins match."""
+"""The models of the usual paper with their counts, which the stand-ins match."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cembench.results.papers import papers
+from cembench.results.papers import usual_paper
 
 
 @dataclass(frozen=True)
@@ -33,11 +33,11 @@ class Row:
 
 
 def _rows() -> Mapping[str, Row]:
+    paper = usual_paper()
     return {
         model.lower().replace("'s ", " ").replace(" ", "-") + "-stand-in": Row(
             model, paper.count(model, "vertices"), paper.faces(model)
         )
-        for paper in reversed([*papers().values()])
         for model in paper.models
     }
 

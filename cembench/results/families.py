@@ -45,8 +45,8 @@ def family_means(figures: Sequence[float], families: Sequence[Hashable]) -> list
 def share_interval(share: float, families: int) -> Interval:
     """Return the 95 % Wilson interval of a mean of shares, one for each family.
 
-    >>> share_interval(1.0, 10)
-    Interval(low=0.7224..., high=1.0)
+    >>> round(share_interval(1.0, 10).low, 3)
+    0.722
     """
     z2 = _normal() ** 2
     middle = (share + z2 / (2 * families)) / (1 + z2 / families)

@@ -22,10 +22,18 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import load_registry
 from tests.real_meshes import real_mesh
 
-GROUPS = {"paper": 7, "disks": 24, "holes": 16, "closed": 5, "stress": 5}
+GROUPS = {
+    "paper": 7,
+    "disks": 24,
+    "holes": 16,
+    "closed": 5,
+    "stress": 5,
+    "corpus": 141,
+    "expressions": 8,
+}
 
 
-def test_the_catalogue_has_52_checksums_and_5_meshes_known_by_their_hash():
+def test_the_catalogue_has_201_checksums_and_5_meshes_known_by_their_hash():
     assert Counter(d.group for d in REAL_MESHES) == GROUPS
     checked = [d for d in REAL_MESHES if d.sha256]
     assert len(checked) == 52

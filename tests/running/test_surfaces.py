@@ -71,7 +71,7 @@ def test_a_name_a_file_and_its_faces(tmp_path, monkeypatch):
     assert cembench.load_surface("mine.obj").name == "mine"
     with pytest.raises(MeshError, match=r"there is no such file.*Did you mean mine\.obj\?"):
         load_surface("mime.obj")
-    with pytest.raises(MeshError, match=r"neither a file nor .*Did you mean flat-disk\?"):
+    with pytest.raises(MeshError, match=r"neither a file nor .*Did you mean flat-disk"):
         load_surface("flatdisk")
     with pytest.raises(MeshError, match=r"Did you mean mine\.obj\?"):
         load_surface("mine")
