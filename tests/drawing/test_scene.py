@@ -23,10 +23,19 @@ def relief(height, faces=800):
 
 @pytest.mark.parametrize("faces", [100, 3_000])
 def test_view_is_a_rotation(faces):
-    for name in load_registry().surfaces:
-        if name == "ict-face":  # needs files that are fetched
-            continue
-        R = view_rotation(load_registry().surface(name).function(faces))
+    surfaces = load_registry().surfaces.values()
+    check_rotations([s for s in surfaces if s.kept is None and s.name != "ict-face"], faces)
+
+
+@pytest.mark.slow  # each is sculpted, which takes ten seconds
+def test_view_of_a_sculpted_surface_is_a_rotation():
+    check_rotations([s for s in load_registry().surfaces.values() if s.kept is not None], 100)
+
+
+def check_rotations(surfaces, faces):
+    assert len(surfaces) > 5
+    for surface in surfaces:
+        R = view_rotation(surface.function(faces))
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) > 0
 
