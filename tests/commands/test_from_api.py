@@ -271,10 +271,10 @@ def test_ctrl_c_while_the_command_line_is_loaded_ends_with_a_line(monkeypatch, c
 
     class Interrupts:
         def find_spec(self, name, path=None, target=None):
-            if name == "cembench.commands.cli":
+            if name == "cembench.commands.app":
                 raise KeyboardInterrupt
 
-    monkeypatch.delitem(sys.modules, "cembench.commands.cli")
+    monkeypatch.delitem(sys.modules, "cembench.commands.app")
     monkeypatch.setattr(sys, "meta_path", [Interrupts(), *sys.meta_path])
     with pytest.raises(SystemExit) as stopped:
         main()
