@@ -102,6 +102,7 @@ def refined_map(
     Examples
     --------
     >>> import cembench
+    >>> from cembench.conformal.metrics import flipped_triangles
     >>> disk = cembench.surface("hemi-ellipsoid", 400)
     >>> found = refined_map(disk)
     >>> found.mesh.n >= disk.n, flipped_triangles(found.mesh, found.uv)
