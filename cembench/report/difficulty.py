@@ -7,9 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.laplacian import half_cotangents
-from cembench.conformal.metrics import in_common_gauge, is_disk_map
+from cembench.conformal.harmonic import edge_lengths
+from cembench.conformal.metrics import corner_angles, in_common_gauge, is_disk_map
 from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.flips import area_of_sides
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.topology import undirected_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -70,21 +71,15 @@ def shape(mesh: TriangleMesh) -> Shape:
     >>> f"{flat.boundary_excess:.1f}", flat.chord_share, flat.angle_defect < 1e-6
     ('1.0', 0.0, True)
     """
-    angles = np.degrees(np.arctan2(1, 2 * half_cotangents(mesh.V, mesh.F)))
-    angles = np.where(angles < 0, angles + 180, angles)
+    angles = corner_angles(mesh.V, mesh.F)
     on_boundary = np.zeros(mesh.n, dtype=bool)
     on_boundary[np.concatenate(mesh.loops)] = True
     edges, _ = undirected_edges(mesh.F)
     around = sum(len(loop) for loop in mesh.loops)  # as many edges as vertices
     chords = int(on_boundary[edges].all(axis=1).sum()) - around
     total = np.bincount(mesh.F.ravel(), angles.ravel(), mesh.n)[~on_boundary]
-    sides = side_lengths(mesh.V, mesh.F)
-    p = sides.sum(axis=1) / 2
-    area = float(np.sqrt(np.maximum(p * np.prod(p[:, None] - sides, axis=1), 0)).sum())
-    length = sum(
-        float(np.linalg.norm(mesh.V[np.roll(loop, -1)] - mesh.V[loop], axis=1).sum())
-        for loop in mesh.loops
-    )
+    area = float(area_of_sides(*side_lengths(mesh.V, mesh.F).T).sum())
+    length = sum(float(edge_lengths(mesh, loop).sum()) for loop in mesh.loops)
     return Shape(
         float((angles.max(axis=1) > OBTUSE).mean()),
         chords / around,
