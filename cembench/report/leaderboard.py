@@ -1,13 +1,13 @@
 """The figures of several runs together, by question: angles, seconds at equal angles, success.
 
-Every figure is one record's, which it opens: medians are the lower of two, and a share opens the
-first cell that did not end ok. Angles do not depend on the machine, so those of all runs stand
-together; seconds are only ever divided by seconds of the same machine and run.
+Every figure opens a record: a median, the lower of two, its own; a share the first cell that did
+not end ok; a count the cell nearest to the best. Angles do not depend on the machine, so those of
+all runs stand together; seconds are only ever divided by seconds of the same machine and run.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
@@ -123,24 +123,54 @@ def family(name: str, mesh_hash: str, origin: str, registry: Registry) -> str:
     return "generated" if made else "other"
 
 
-def _by_algorithm(frame: pd.DataFrame, figure: str) -> Iterator[tuple[str, pd.DataFrame]]:
-    """Yield algorithms with their rows in order of a figure, the least median first."""
-    groups = [(str(label), rows.sort_values([figure, "record"])) for label, rows in _groups(frame)]
-    yield from sorted(groups, key=lambda one: (_middle(one[1])[figure], one[0]))
+#: Which row of those in order stands for all: the middle, or the lower of two; the last.
+_RANKS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
+    "median": lambda ordered: ordered.iloc[(len(ordered) - 1) // 2],
+    "worst": lambda ordered: ordered.iloc[-1],
+}
+
+
+@dataclass(frozen=True)
+class _Count:
+    """How many rows there are, or values of a column; `ties` counts those as good as the best.
+
+    It opens the row that is nearest to the best.
+    """
+
+    title: str
+    distinct: str = "record"
+    ties: bool = False
+
+    @property
+    def column(self) -> Column:
+        return Column(self.title)
+
+    def of(self, ordered: pd.DataFrame) -> Value:
+        counted = ordered[ordered["ratio"] <= _TIE] if self.ties else ordered
+        number = counted[self.distinct].nunique()
+        return Value(f"{number:,d}", number, "surface", str(ordered["record"].iloc[0]))
+
+
+@dataclass(frozen=True)
+class _Rank:
+    """The median of a figure, or its worst, which opens its record."""
+
+    title: str
+    group: str
+    figure: str
+
+    @property
+    def column(self) -> Column:
+        return Column(self.title, self.group)
+
+    def of(self, rows: pd.DataFrame) -> Value:
+        row = _RANKS[self.title](rows.sort_values([self.figure, "record"]))
+        number = float(row[self.figure])
+        return Value(significant(number), number, "surface", str(row["record"]))
 
 
 def _groups(frame: pd.DataFrame) -> Iterable[tuple[Any, pd.DataFrame]]:
     return frame.groupby("label", sort=True)
-
-
-def _middle(ordered: pd.DataFrame) -> pd.Series:
-    """Return the middle row, or the lower of two."""
-    return ordered.iloc[(len(ordered) - 1) // 2]
-
-
-def _opening(row: pd.Series, figure: str, text: str | None = None) -> Value:
-    number = float(row[figure])
-    return Value(text or significant(number), number, "surface", str(row["record"]))
 
 
 def _angles(valid: pd.DataFrame, target: str) -> Item:
@@ -153,35 +183,16 @@ def _angles(valid: pd.DataFrame, target: str) -> Item:
     once = known.sort_values([ANGLE, "record"]).drop_duplicates(["label", "mesh_hash"])
     least = once.groupby("mesh_hash")[ANGLE].transform("min")
     once = once.assign(ratio=once[ANGLE].clip(lower=_UNSEEN) / least.clip(lower=_UNSEEN))
-    rows: list[list[Plain]] = []
-    for label, own in _by_algorithm(once, "ratio"):
-        by_angle = own.sort_values([ANGLE, "record"])
-        rows.append(
-            [
-                label,
-                len(own),
-                int((own["ratio"] <= _TIE).sum()),
-                _opening(_middle(own), "ratio"),
-                _opening(own.iloc[-1], "ratio"),
-                _opening(_middle(by_angle), ANGLE),
-                _opening(by_angle.iloc[-1], ANGLE),
-            ]
-        )
-    return Table.of(
-        f"angles-{slug(target)}",
-        title,
-        [
-            Column("algorithm", numeric=False),
-            Column("surfaces", form=",d"),
-            Column("best on", form=",d"),
-            *(Column(t, "over the least on the surface") for t in ("median", "worst")),
-            *(Column(t, "degrees") for t in ("median", "worst")),
-        ],
-        rows,
-        caption=f"Over {once['mesh_hash'].nunique()} surfaces; an algorithm is compared on those "
-        "that it maps. Best: within 1 % of the least angle error. Errors below 0.01 degrees count "
-        "as that.",
+    figures: tuple[_Count | _Rank, ...] = (
+        *(_Count("surfaces"), _Count("best on", ties=True)),
+        *(_Rank(t, "over the least on the surface", "ratio") for t in _RANKS),
+        *(_Rank(t, "degrees", ANGLE) for t in _RANKS),
     )
+    caption = (
+        f"Over {once['mesh_hash'].nunique()} surfaces; an algorithm is compared on those that it "
+        "maps. Best: within 1 % of the least angle error. Errors below 0.01 degrees count as that."
+    )
+    return _compared(f"angles-{slug(target)}", title, once, figures, caption)
 
 
 def _seconds(valid: pd.DataFrame) -> Item:
@@ -193,26 +204,33 @@ def _seconds(valid: pd.DataFrame) -> Item:
     if known.empty:
         return Gap(title, "no run has two algorithms with equally good maps of a surface")
     least = known.groupby(place)["seconds"].transform("min")
-    known = known.assign(ratio=known["seconds"] / least)
-    rows: list[list[Plain]] = []
-    for label, own in _by_algorithm(known, "ratio"):
-        counts = (own["mesh_hash"].nunique(), own["machine"].nunique())
-        fastest = int((own["ratio"] <= _TIE).sum())
-        ends = (_opening(_middle(own), "ratio"), _opening(own.iloc[-1], "ratio"))
-        rows.append([label, *counts, len(own), fastest, *ends])
-    return Table.of(
+    figures: tuple[_Count | _Rank, ...] = (
+        *(_Count("surfaces", "mesh_hash"), _Count("machines", "machine"), _Count("cells")),
+        _Count("fastest", ties=True),
+        *(_Rank(t, "seconds over the fastest", "ratio") for t in _RANKS),
+    )
+    return _compared(
         "seconds-at-equal-angles",
         title,
-        [
-            Column("algorithm", numeric=False),
-            *(Column(t, form=",d") for t in ("surfaces", "machines", "cells", "fastest")),
-            *(Column(t, "seconds over the fastest") for t in ("median", "worst")),
-        ],
-        rows,
-        caption="Maps to the disk whose mean angle error is at most 1.25 times the least on the "
-        "surface, or 0.25 degrees larger: their seconds over those of the fastest of them, in the "
-        "same run on the same machine.",
+        known.assign(ratio=known["seconds"] / least),
+        figures,
+        "Maps to the disk whose mean angle error is at most 1.25 times the least on the surface, "
+        "or 0.25 degrees larger: their seconds over those of the fastest of them, in the same run "
+        "on the same machine.",
     )
+
+
+def _compared(
+    key: str, title: str, rows: pd.DataFrame, figures: Sequence[_Count | _Rank], caption: str
+) -> Table:
+    """Return a table of algorithms, the least median ratio to the best first."""
+    groups = [(str(label), own.sort_values(["ratio", "record"])) for label, own in _groups(rows)]
+    groups.sort(key=lambda one: (_RANKS["median"](one[1])["ratio"], one[0]))
+    columns = [Column("algorithm", numeric=False), *(figure.column for figure in figures)]
+    cells: list[list[Plain]] = [
+        [label, *(figure.of(own) for figure in figures)] for label, own in groups
+    ]
+    return Table.of(key, title, columns, cells, caption=caption)
 
 
 def _success(frame: pd.DataFrame) -> Table:
@@ -245,23 +263,27 @@ def _success(frame: pd.DataFrame) -> Table:
 
 def _machines(entrants: Sequence[Entrant]) -> Table:
     rows: list[list[Plain]] = []
-    for entrant in entrants:
+    for number, entrant in enumerate(entrants):
         environments = entrant.evidence.store.environments()
-        by_environment: dict[str, list[float]] = {}
+        timed: dict[str, list[tuple[float, str]]] = {}
         for record in entrant.evidence.records:
-            kernels = by_environment.setdefault(record.environment, [])
-            kernels += [r.kernel_seconds for r in record.outcome.rounds if r.kernel_seconds]
-        for key, kernels in by_environment.items():
-            about = environments.get(key, {})
+            key = f"{number:03d}{record.cell.key}"
+            timed.setdefault(record.environment, []).extend(
+                (r.kernel_seconds, key) for r in record.outcome.rounds if r.kernel_seconds
+            )
+        for environment, kernels in timed.items():
+            about = environments.get(environment, {})
             git = about.get("git") or {}
-            kernel = sorted(kernels)[(len(kernels) - 1) // 2] if kernels else None
+            middle = sorted(kernels)[(len(kernels) - 1) // 2] if kernels else None
             rows.append(
                 [
                     entrant.name,
                     machine_of(about) or "not named",
                     str(about.get("cpu") or "-"),
                     about.get("cores"),
-                    None if kernel is None else 1000 * kernel,
+                    missing("no kernel was timed")
+                    if middle is None
+                    else Value(f"{1000 * middle[0]:.3g}", 1000 * middle[0], "surface", middle[1]),
                     str(about.get("cembench") or "-"),
                     str(git.get("commit") or "-")[:10] + ("+" if git.get("dirty") else ""),
                     entrant.signer or "-",
@@ -274,7 +296,7 @@ def _machines(entrants: Sequence[Entrant]) -> Table:
         [
             *(Column(t, numeric=False) for t in text),
             Column("cores", form=",d", lacking="not recorded"),
-            Column("kernel", unit="ms", form=".3g", lacking="not recorded"),
+            Column("kernel", unit="ms"),
             *(Column(t, numeric=False) for t in ("cembench", "commit", "signed by")),
         ],
         rows,

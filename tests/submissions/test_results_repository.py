@@ -146,6 +146,8 @@ def test_the_leaderboard_answers_its_questions_and_each_figure_names_its_record(
     _, report = published
     angles = table_of(report, "angles-disk")
     assert {row[0].text for row in angles.rows} == {"CEM", "Direct CEM", "FDM", "LDM", "Harmonic"}
+    for row in [*angles.rows, *table_of(report, "seconds-at-equal-angles").rows]:
+        assert all(value.record in report.records for value in row[1:])
     for row in angles.rows:
         for value, figure in zip(row[3:], (0, 0, 1, 1), strict=True):
             assert value.record in report.records
@@ -162,6 +164,7 @@ def test_the_leaderboard_answers_its_questions_and_each_figure_names_its_record(
     assert report.records[fdm[-1].record]["status"] == "failed"
     machines = table_of(report, "machines")
     assert len(machines.rows) == 10
+    assert all(row[4].record in report.records for row in machines.rows if row[4].number)
     assert len(table_of(report, "every-cell").rows) == 10 * len(SECONDS) * len(SURFACES)
 
 
