@@ -71,18 +71,18 @@ def fdm_program(mesh: DiskMesh) -> None:
     "ldm-program",
     title="LDM, its authors' program",
     target="disk",
-    source="Choi & Lui 2018",
+    source="Choi & Lui 2018; lineardiskmap.m",
     **declaration(
         "CEMBENCH_LDM_PROGRAM",
-        "linear_disk_map",
+        "lineardiskmap",
         "the authors (https://www.math.cuhk.edu.hk/~ptchoi)",
     ),
 )
 def ldm_program(mesh: DiskMesh) -> None:
     """Map a disk by the linear disk map, as its authors programmed it.
 
-    Untested: no copy of the program was at hand. Its function, whatever its name, takes and returns
-    the same arrays as that of the fast disk map.
+    It scales the disk by the coordinates of all its vertices, where `ldm` takes the boundary's, and
+    so turns long surfaces inside out.
     """
 
 
