@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     )
     from cembench.api.cut import cut
     from cembench.api.fetch import PublicSurfaces, fetch
-    from cembench.api.holes import HoledMaps, holes
     from cembench.api.map_files import map_files
     from cembench.api.morph_surfaces import morph
     from cembench.api.parameterize import Result, parameterize
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
     from cembench.api.submissions import Submission, check_submissions, submit
-    from cembench.api.theory import theory
     from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
@@ -84,7 +82,6 @@ _PLACES = {
     ),
     "cembench.api.cut": ("cut",),
     "cembench.api.fetch": ("PublicSurfaces", "fetch"),
-    "cembench.api.holes": ("HoledMaps", "holes"),
     "cembench.api.map_files": ("map_files",),
     "cembench.api.morph_surfaces": ("morph",),
     "cembench.api.parameterize": ("Result", "parameterize"),
@@ -92,7 +89,6 @@ _PLACES = {
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
     "cembench.api.submissions": ("Submission", "check_submissions", "submit"),
-    "cembench.api.theory": ("theory",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -104,7 +100,6 @@ __all__ = [
     "CembenchError",
     "DatasetError",
     "DiskMesh",
-    "HoledMaps",
     "HoledMesh",
     "MapStep",
     "MeshError",
@@ -130,7 +125,6 @@ __all__ = [
     "cut",
     "external_program",
     "fetch",
-    "holes",
     "list_algorithms",
     "list_surfaces",
     "load_surface",
@@ -144,7 +138,6 @@ __all__ = [
     "submit",
     "surface",
     "surface_family",
-    "theory",
     "validate",
     "write_mesh",
 ]
@@ -155,13 +148,21 @@ def __getattr__(name: str) -> Any:
         from cembench.core.version import installed_version
 
         return installed_version()
-    if name not in _PLACE_OF:
+    place = _PLACE_OF.get(name) or _verbs().get(name)
+    if place is None:
         module = sys.modules[__name__]  # by which Python suggests what was meant
         raise AttributeError(f"module 'cembench' has no attribute {name!r}", name=name, obj=module)
-    value = getattr(importlib.import_module(_PLACE_OF[name]), name)
+    value = getattr(importlib.import_module(place), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *_verbs()})
+
+
+def _verbs() -> dict[str, str]:
+    """Return the modules of the verbs that papers bring, by name."""
+    from importlib.metadata import entry_points
+
+    return {entry.name: entry.value for entry in entry_points(group="cembench.verbs")}

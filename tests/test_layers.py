@@ -74,12 +74,12 @@ BUDGETS = {
     "registry": 950,
     "results": 4_550,
     "running": 7_250,
-    "drawing": 1_600,
+    "drawing": 1_500,
     "report": 8_150,
     "validation": 2_350,
-    "morphing": 1_750,
-    "api": 6_400,
-    "commands": 2_850,
+    "morphing": 1_550,
+    "api": 5_250,
+    "commands": 2_800,
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import entry_points
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -57,7 +58,6 @@ def morph(
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.overwriting import refuse_inputs
     from cembench.morphing.drawing import check_views
-    from cembench.morphing.exhibit import write_morph_exhibits
     from cembench.morphing.surfaces_and_films import (
         rows_of_paper,
         write_films,
@@ -106,7 +106,8 @@ def morph(
             words += [] if given["faces"] is None else ["--faces", str(given["faces"])]
             command = f"cembench morph {' '.join(words)} --run {run}"
             rows = rows_of_paper(load_registry(given["plugins"]), surfaces)
-            written += write_morph_exhibits(run, found, figures, command, rows, tell)
+            for paper in entry_points(group="cembench.exhibits", name="morph"):
+                written += paper.load()(run, found, figures, command, rows, tell)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -126,10 +127,10 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
-    from cembench.morphing.exhibit import morph_tables
+    from cembench.morphing.metrics import tables_of
     from cembench.report.content.exhibits import exhibit_table
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")
-    for table in morph_tables(figures):
+    for table in tables_of(figures):
         out.print(exhibit_table(table, "", "surface"))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cembench.conformal.metrics import dilatations, dirichlet_energy, flipped_triangles
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.registration import Registration
+from cembench.results.exhibits import ExhibitTable
 
 Ints = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -114,3 +115,38 @@ def distances_to(points: Real, V: Real, F: Ints) -> Real:
 
     squared, _, _ = igl.point_mesh_squared_distance(points, np.ascontiguousarray(V), F)
     return np.sqrt(squared)
+
+
+#: The figures of a registration: the heading and the format of each.
+_REGISTRATION = {
+    "surface": ("surface", ""),
+    "steps": ("steps to lambda", "d"),
+    "landmark_error_share": ("landmark error / size", ".2e"),
+    "dirichlet_energy": ("E_D", ".4f"),
+    "dilatation_mean": ("mean dilatation", ".2f"),
+    "dilatation_max": ("maximum dilatation", ".1f"),
+    "flipped_triangles": ("folds", "d"),
+    "distance_mean_edges": ("mean distance / edge", ".3f"),
+    "hausdorff_edges": ("Hausdorff / edge", ".2f"),
+}
+
+
+def tables_of(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
+    """Return the metrics of the registrations, one row per surface, and those of the path."""
+    rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
+    registrations = ExhibitTable.of(
+        "Registrations",
+        _REGISTRATION,
+        rows,
+        notes=(
+            "Distances between the carried surface and its target, the larger of both ways, over "
+            "all vertices and 50,000 random points each, in mean edges of the target. A dash: no "
+            "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
+        ),
+    )
+    path = {
+        "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
+        "largest_step_share": ("largest step between frames", ".4f"),
+    }
+    note = "In sizes of the first surface; the time from the first to the last is 1."
+    return registrations, ExhibitTable.of("Smoothness of the path", path, [figures], notes=(note,))
