@@ -16,6 +16,7 @@ from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
+from cembench.core.wording import Advice
 from cembench.mesh.files import SINGLE, write_soup
 from cembench.mesh.formats import gltf, obj
 from cembench.mesh.soup import Soup, Texture, columns
@@ -241,8 +242,8 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | No
     if source is None or source.parts[0].repaired:
         raise ParameterError.about(
             "{bake} needs the faces of the original file, but the surface was repaired, or is not "
-            "of a file; run `cembench repair` to see what it changes, and fix the file so that it "
-            "keeps its UVs."
+            "of a file; {repair} shows what it changes. Fix the file so that it keeps its UVs.",
+            repair=Advice("`cembench.repair(surface).steps`", "`cembench repair`"),
         )
     old = uv_of_faces(source.path, soup.triangles)
     assert soup.uv is not None
