@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
-    from cembench.api.submissions import Submission, check_submissions, submit
+    from cembench.api.submissions import check_submissions, submit
     from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
     from cembench.registry import algorithm, external_program, surface_family
+    from cembench.results.bundle import Submission
     from cembench.running.surfaces import load_surface
 
 #: Where each public name lies.
@@ -88,7 +89,8 @@ _PLACES = {
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
-    "cembench.api.submissions": ("Submission", "check_submissions", "submit"),
+    "cembench.api.submissions": ("check_submissions", "submit"),
+    "cembench.results.bundle": ("Submission",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
