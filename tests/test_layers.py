@@ -78,7 +78,7 @@ BUDGETS = {
     "report": 8_150,
     "validation": 2_350,
     "morphing": 1_550,
-    "api": 5_250,
+    "api": 5_100,
     "commands": 2_800,
 }
 
