@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.metrics import dilatations, dirichlet_energy, flipped_triangles
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.registration import Registration
 from cembench.results.exhibits import ExhibitTable
@@ -26,8 +27,7 @@ def size_of(V: Real) -> float:
 
 def mean_edge(mesh: DiskMesh) -> float:
     """Return the mean length of the triangles' sides."""
-    corners = mesh.V[mesh.F]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+    return float(side_lengths(mesh.V, mesh.F).mean())
 
 
 def registration_metrics(

@@ -11,13 +11,13 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.resample import interpolated, locate
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.align import aligned, best_turn, centred, vertex_areas
 from cembench.morphing.landmarks import Landmarks, check_order
 from cembench.morphing.metrics import registration_metrics, size_of
 from cembench.morphing.path import largest_acceleration, largest_step, pose_of, position
 from cembench.morphing.registration import LAMBDA, REACH, Registration, register
-from cembench.morphing.transport import locate
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -181,8 +181,8 @@ def morph(
         check_order(landmarks.names, z[places[:, 0]], fitted[there], (first.name, mesh.name))
         registration = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
         tell(f"carrying {first.name} onto {mesh.name}")
-        at = locate(registration.uv, mesh.F, mesh.boundary, z)
-        on = at.carry(mesh.F, mesh.V)
+        face, weights = locate(registration.uv, mesh.F, z, nearest=True)
+        on = interpolated(weights, mesh.V[mesh.F[face]])
         moved.append(fitted)
         registrations.append(registration)
         carried.append(on)

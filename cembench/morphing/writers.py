@@ -15,7 +15,7 @@ from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.morphing.drawing import Film, draw_film
+from cembench.morphing.drawing import draw_film
 
 if TYPE_CHECKING:
     from cembench.morphing.morph import Morph
@@ -78,7 +78,7 @@ def save(
         tell(f"frame {frame + 1} of {frames}")
 
     if any(map(is_film, outputs)):
-        pictures = draw_film(Film.of(first, morph.stops, times, views, size), tell_frame)
+        pictures = draw_film(first, morph.stops, times, views, size, tell_frame)
     for path in outputs:
         if is_film(path):
             write_film(path, pictures)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cembench.core.atomic import write_bytes
 from cembench.drawing.preview import draw_panels
 from cembench.drawing.scene import FILL
-from cembench.morphing.drawing import Film, draw_film
+from cembench.morphing.drawing import draw_film
 from cembench.morphing.metrics import tables_of
 from cembench.morphing.morph import Morph
 from cembench.results.exhibits import (
@@ -107,8 +107,7 @@ def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> E
 def strip_page(morph: Morph, side: int = 240) -> bytes:
     """Return a PNG of the path at seven moments, one column each, in two views."""
     times = np.linspace(0, 1, FRAMES)
-    film = Film.of(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
-    pictures = draw_film(film)
+    pictures = draw_film(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
     rows = [
         [picture[:, row * side : (row + 1) * side] for picture in pictures]
         for row in range(len(STRIP_VIEWS))
