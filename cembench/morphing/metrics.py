@@ -66,7 +66,10 @@ def registration_metrics(
     stretch = dilatations(target, registration.uv)
     apart = np.linalg.norm(carried[landmarks] - target.V[there], axis=1)
     edge = mean_edge(target)
-    there_and_back = distances(carried, F, target), distances_back(target, carried, F)
+    there_and_back = (
+        distances_to(_samples(carried, F), target.V, target.F),
+        distances_to(_samples(target.V, target.F), carried, F),
+    )
     figures: dict[str, Any] = {
         "landmark_error_share": float(apart.max() / size_of(target.V)) if len(landmarks) else None,
         "landmark_error_disk": registration.landmark_error if len(landmarks) else None,
@@ -86,16 +89,6 @@ def registration_metrics(
     if not np.isfinite(figures["dilatation_max"]):  # a triangle so thin that the value overflows
         figures |= {"dilatation_mean": None, "dilatation_max": None}
     return figures
-
-
-def distances(carried: Real, F: Ints, target: DiskMesh) -> Real:
-    """Return the distances of points on the carried surface from the target."""
-    return distances_to(_samples(carried, F), target.V, target.F)
-
-
-def distances_back(target: DiskMesh, carried: Real, F: Ints) -> Real:
-    """Return the distances of points on the target from the carried surface."""
-    return distances_to(_samples(target.V, target.F), carried, F)
 
 
 def _samples(V: Real, F: Ints) -> Real:
