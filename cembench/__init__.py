@@ -150,7 +150,7 @@ def __getattr__(name: str) -> Any:
         from cembench.core.version import installed_version
 
         return installed_version()
-    place = _PLACE_OF.get(name) or _verbs().get(name)
+    place = _PLACE_OF.get(name) or _of_papers().get(name)
     if place is None:
         module = sys.modules[__name__]  # by which Python suggests what was meant
         raise AttributeError(f"module 'cembench' has no attribute {name!r}", name=name, obj=module)
@@ -160,11 +160,12 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_verbs()})
+    return sorted({*globals(), *__all__, *_of_papers()})
 
 
-def _verbs() -> dict[str, str]:
-    """Return the modules of the verbs that papers bring, by name."""
+def _of_papers() -> dict[str, str]:
+    """Return the modules of the names that papers bring with their verbs."""
     from importlib.metadata import entry_points
 
-    return {entry.name: entry.value for entry in entry_points(group="cembench.verbs")}
+    places = [entry.value for entry in entry_points(group="cembench.verbs")]
+    return {name: place for place in places for name in importlib.import_module(place).__all__}

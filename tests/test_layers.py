@@ -78,7 +78,7 @@ BUDGETS = {
     "report": 8_150,
     "validation": 2_350,
     "morphing": 1_400,
-    "api": 5_100,
+    "api": 5_050,
     "commands": 2_800,
 }
 

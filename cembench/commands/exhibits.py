@@ -1,8 +1,9 @@
 """Commands that papers bring: each makes exhibits of surfaces and adds them to a run.
 
-An entry point of the group ``cembench.verbs`` names a module. Its function of the entry point's
-name is the call of the Python API; ``loaded`` reads a surface, and ``shown``, ``facts`` and
-``failures`` say of a list of results what is printed, in plain data, and what went wrong.
+An entry point of the group ``cembench.verbs`` names a module. What its ``__all__`` names is part of
+the Python API; the function of the entry point's name becomes a command. ``loaded`` reads a
+surface, and ``shown``, ``facts`` and ``failures`` say of a list of results what is printed, in plain
+data, and what went wrong.
 """
 
 from __future__ import annotations

@@ -58,7 +58,7 @@ def morph(
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.overwriting import refuse_inputs
     from cembench.morphing.drawing import check_views
-    from cembench.morphing.writers import check_output, files_of, is_film, save
+    from cembench.morphing.writers import check_output, files_of, is_film, write_path
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.running.plan import provenances
@@ -92,7 +92,7 @@ def morph(
         for kind, places in kinds.items():
             if places:
                 with _timed(seconds, kind):
-                    save(found, places, frames, chosen_views, size, tell)
+                    write_path(found, places, frames, chosen_views, size, tell)
         if run is not None:
             words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
             words += ["-a", given["algorithm"]]

@@ -100,9 +100,9 @@ class Morph:
             MP4 needs a package that is not installed.
 
         """
-        from cembench.morphing.writers import files_of, save
+        from cembench.morphing.writers import files_of, write_path
 
-        save(self, [Path(path)], frames, views, size)
+        write_path(self, [Path(path)], frames, views, size)
         return files_of(Path(path), frames)
 
     def metrics(self, frames: int) -> dict[str, Any]:

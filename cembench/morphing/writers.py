@@ -58,7 +58,7 @@ def files_of(path: Path, frames: int) -> list[Path]:
     return mesh_files(path, frames)
 
 
-def save(
+def write_path(
     morph: Morph,
     outputs: Sequence[Path],
     frames: int,

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from cembench.results.exhibits import Exhibit
     from cembench.running.surfaces import SurfaceInput
 
+__all__ = ["HoledMaps", "holes"]
+
 #: The surface that is mapped where none is named; it stands in for a model without a public mesh.
 STAND_IN = "ho-face-with-holes"
 

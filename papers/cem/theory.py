@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from .theory_facts import TheoryFacts
 
+__all__ = ["theory"]
+
 
 @checked
 def theory(
