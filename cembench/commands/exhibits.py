@@ -2,8 +2,8 @@
 
 An entry point of the group ``cembench.verbs`` names a module. What its ``__all__`` names is part of
 the Python API; the function of the entry point's name becomes a command. ``loaded`` reads a
-surface, and ``shown``, ``facts`` and ``failures`` say of a list of results what is printed, in plain
-data, and what went wrong.
+surface; ``shown``, ``facts`` and ``failures`` are what is printed of a list of results, the same as
+plain data, and what went wrong.
 """
 
 from __future__ import annotations
