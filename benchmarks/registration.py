@@ -19,12 +19,12 @@ from benchmarks.pages import Section, Table
 from cembench.api.parameterize import parameterize
 from cembench.conformal.moebius import Moebius
 from cembench.conformal.planar import signed_areas
+from cembench.conformal.resample import interpolated, locate
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.align import aligned, centred, to_centre, vertex_areas
 from cembench.morphing.landmarks import check_order
 from cembench.morphing.registration import register
-from cembench.morphing.transport import locate
 from cembench.results.intervals import median_interval
 
 mpl.use("Agg")
@@ -135,8 +135,8 @@ def errors_of_pair(
         return round(share, DIGITS)  # as the CSV has it, so that the page can be made from it
 
     def carried(uv: np.ndarray, z: np.ndarray) -> float:
-        at = locate(uv, other.mesh.F, other.mesh.boundary, z[seen])
-        return error(at.carry(other.mesh.F, other.mesh.V))
+        where, weights = locate(uv, other.mesh.F, z[seen], nearest=True)
+        return error(interpolated(weights, other.mesh.V[other.mesh.F[where]]))
 
     errors: dict[tuple[str, int], float] = {}
     stretch = _stretch(other)

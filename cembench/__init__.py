@@ -27,15 +27,13 @@ if TYPE_CHECKING:
     )
     from cembench.api.cut import cut
     from cembench.api.fetch import PublicSurfaces, fetch
-    from cembench.api.holes import HoledMaps, holes
     from cembench.api.map_files import map_files
     from cembench.api.morph_surfaces import morph
     from cembench.api.parameterize import Result, parameterize
     from cembench.api.parameterize_many import parameterize_many
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
-    from cembench.api.submissions import Submission, check_submissions, submit
-    from cembench.api.theory import theory
+    from cembench.api.submissions import check_submissions, submit
     from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
@@ -53,6 +51,7 @@ if TYPE_CHECKING:
     from cembench.mesh.files import read_mesh, write_mesh
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
     from cembench.registry import algorithm, external_program, surface_family
+    from cembench.results.bundle import Submission
     from cembench.running.surfaces import load_surface
 
 #: Where each public name lies.
@@ -84,15 +83,14 @@ _PLACES = {
     ),
     "cembench.api.cut": ("cut",),
     "cembench.api.fetch": ("PublicSurfaces", "fetch"),
-    "cembench.api.holes": ("HoledMaps", "holes"),
     "cembench.api.map_files": ("map_files",),
     "cembench.api.morph_surfaces": ("morph",),
     "cembench.api.parameterize": ("Result", "parameterize"),
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
-    "cembench.api.submissions": ("Submission", "check_submissions", "submit"),
-    "cembench.api.theory": ("theory",),
+    "cembench.api.submissions": ("check_submissions", "submit"),
+    "cembench.results.bundle": ("Submission",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -104,7 +102,6 @@ __all__ = [
     "CembenchError",
     "DatasetError",
     "DiskMesh",
-    "HoledMaps",
     "HoledMesh",
     "MapStep",
     "MeshError",
@@ -130,7 +127,6 @@ __all__ = [
     "cut",
     "external_program",
     "fetch",
-    "holes",
     "list_algorithms",
     "list_surfaces",
     "load_surface",
@@ -144,7 +140,6 @@ __all__ = [
     "submit",
     "surface",
     "surface_family",
-    "theory",
     "validate",
     "write_mesh",
 ]
@@ -155,13 +150,22 @@ def __getattr__(name: str) -> Any:
         from cembench.core.version import installed_version
 
         return installed_version()
-    if name not in _PLACE_OF:
+    place = _PLACE_OF.get(name) or _of_papers().get(name)
+    if place is None:
         module = sys.modules[__name__]  # by which Python suggests what was meant
         raise AttributeError(f"module 'cembench' has no attribute {name!r}", name=name, obj=module)
-    value = getattr(importlib.import_module(_PLACE_OF[name]), name)
+    value = getattr(importlib.import_module(place), name)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted({*globals(), *__all__, *_of_papers()})
+
+
+def _of_papers() -> dict[str, str]:
+    """Return the modules of the names that papers bring with their verbs."""
+    from importlib.metadata import entry_points
+
+    places = [entry.value for entry in entry_points(group="cembench.verbs")]
+    return {name: place for place in places for name in importlib.import_module(place).__all__}

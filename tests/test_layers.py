@@ -72,14 +72,14 @@ BUDGETS = {
     "linear_algebra": 1_500,
     "conformal": 5_850,
     "registry": 950,
-    "results": 4_550,
+    "results": 4_700,
     "running": 7_250,
-    "drawing": 1_600,
+    "drawing": 1_500,
     "report": 8_150,
     "validation": 2_350,
-    "morphing": 1_750,
-    "api": 6_400,
-    "commands": 2_850,
+    "morphing": 1_400,
+    "api": 5_050,
+    "commands": 2_800,
 }
 
 

@@ -163,11 +163,11 @@ def map_files(
         output_files,
         picture_files,
     )
-    from cembench.api.map_surfaces import FileJobs, Maps, local_files, tasks_of
+    from cembench.api.map_surfaces import FileJobs, Maps, local_files
     from cembench.api.write_maps import FileOptions, beside
     from cembench.core.overwriting import refuse_inputs, refuse_present
     from cembench.running.options import Options
-    from cembench.running.plan import MeasurementSettings
+    from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
 
     def path_of(path: AnyPath | None) -> Path | None:
         return None if path is None else Path(path)
@@ -180,10 +180,9 @@ def map_files(
         check_takes_disks(candidates)
     given, target = [Path(mesh) for mesh in meshes], path_of(output)
     outputs = output_files(given, target)
-    file_options = FileOptions(
-        *(uv, checker, path_of(bake), equal_parts),
-        *(path_of(geometry_image), path_of(remesh), path_of(html), side),
-    )
+    named = {"geometry_image": geometry_image, "remeshed": remesh, "html": html}
+    extras = {what: Path(path) for what, path in named.items() if path is not None}
+    file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
     check_options(given, outputs, file_options)
     is_atlas = any(a.target == "atlas" for a in candidates)
     if is_atlas and (file_options.extras or bake or len(given) > 1):
@@ -205,8 +204,12 @@ def map_files(
         with reporter.busy(f"reading {source}"):
             shells = read_shells(source, registry, candidates, mend=repair, cut=cut)
         check_shells(len(shells.parts), source, file_options)
-        tasks = tasks_of(shells, registry, candidates, parameters or {}, settings, plugins)
-        files.append(FileJobs(shells, tasks, None if together else place))
+        tasks: list[Task] = []
+        for mesh in (part.mesh for part in shells.parts):
+            taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
+            role = {mesh.name: provenance_of(registry, mesh)}
+            tasks += plan_cells([taken], [mesh], parameters or {}, settings, plugins, role)
+        files.append(FileJobs(shells, tuple(tasks), None if together else place))
     if preview and is_atlas:
         reporter.note(
             "no picture was drawn: the islands of an atlas have no fixed positions in the plane"

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
-from cembench.api.write_maps import FileOptions, save_map
+from cembench.api.write_maps import FileOptions, joined, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
 from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
@@ -28,20 +29,22 @@ def write_extras(
 ) -> tuple[Notice, ...]:
     """Write the extra files; return notices of triangles that rounding folds in the new mesh."""
     told: tuple[Notice, ...] = ()
-    if options.samples is not None:
-        from cembench.api.geometry_images import write_geometry_image
+    for what, path in options.extras.items():
+        if what == "geometry_image":
+            from cembench.api.geometry_images import write_geometry_image
 
-        write_geometry_image(options.samples, mesh, z, options.side)
-    if options.remeshed is not None:
-        from cembench.conformal.resample import regular_remesh
+            write_geometry_image(path, mesh, z, options.side)
+        elif what == "remeshed":
+            from cembench.conformal.resample import regular_remesh
 
-        new, new_z = regular_remesh(mesh, z, options.side)
-        told = save_map(options.remeshed, new, new_z, FileOptions(options.place))
-    if options.page is not None:
-        from cembench.api.view import map_page
-        from cembench.report.render.view_page import write_view_page
+            told = save_map(
+                path, *regular_remesh(mesh, z, options.side), FileOptions(options.place)
+            )
+        else:
+            from cembench.api.view import map_page
+            from cembench.report.render.view_page import write_view_page
 
-        write_view_page(options.page, map_page(mesh, z, record.outcome, record.title))
+            write_view_page(path, map_page(mesh, z, record.outcome, record.title))
     return told
 
 
@@ -67,18 +70,19 @@ def check_options(
         raise ParameterError.about(
             "{geometry_image}, {remesh} and {html} take one surface; map them one by one."
         )
-    if options.page is not None and options.page.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError.about(
-            "{page}: {html} writes a web page; use the suffix .html.", page=options.page
-        )
-    if options.page is not None and not options.page.parent.is_dir():
-        raise MeshError(f"{options.page}: there is no folder {options.page.parent}. Make it first.")
-    if options.samples is not None:
-        from cembench.api.geometry_images import check_image_format
+    for what, path in options.extras.items():
+        if what == "geometry_image":
+            from cembench.api.geometry_images import check_image_format
 
-        check_image_format(options.samples)
-    if options.remeshed is not None:
-        check_writable_format(options.remeshed, with_uv=True)
+            check_image_format(path)
+        elif what == "remeshed":
+            check_writable_format(path, with_uv=True)
+        elif path.suffix.lower() not in (".html", ".htm"):
+            raise ParameterError.about(
+                "{page}: {html} writes a web page; use the suffix .html.", page=path
+            )
+        elif not path.parent.is_dir():
+            raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
@@ -202,10 +206,12 @@ def draw_maps(
         words = caption(record.outcome.metrics)
         write_preview(shells.parts[0].mesh, maps[0], picture, title=title, caption=words)
         return
-    starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
-    V = np.concatenate([part.mesh.V for part in shells.parts])
-    F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
-    mesh = TriangleMesh.trusted(V, F, shells.path.stem)
+    moved = packed(maps, areas_of(shells.parts), equal=equal)
+    soups = [
+        Soup.of_triangles(part.mesh.V, part.mesh.F, z)
+        for part, z in zip(shells.parts, moved, strict=True)
+    ]
+    whole = joined(soups)
+    mesh = TriangleMesh.trusted(whole.V, whole.triangles, shells.path.stem)
     title = f"{shells.path.stem}: {len(maps)} surfaces"
-    uv = np.concatenate(packed(maps, areas_of(shells.parts), equal=equal))
-    write_preview(mesh, uv, picture, title=title, turned=False)
+    write_preview(mesh, np.concatenate(moved), picture, title=title, turned=False)

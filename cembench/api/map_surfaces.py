@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,11 @@ from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
 from cembench.mesh import datasets
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Algorithm, Registry
+from cembench.registry import Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
+from cembench.running.plan import Task
 from cembench.running.surfaces import SurfaceFile, file_named, is_generated
 
 Complex = NDArray[np.complex128]
@@ -98,23 +97,6 @@ def local_files(
         or (path if is_generated(str(path), registry) else file_named(path, registry))
         for path in meshes
     ]
-
-
-def tasks_of(
-    shells: Shells,
-    registry: Registry,
-    candidates: Sequence[Algorithm],
-    parameters: Mapping[str, Any],
-    settings: MeasurementSettings,
-    plugins: Sequence[str],
-) -> tuple[Task, ...]:
-    """Return a measurement of each surface of a file, by the first algorithm that takes it."""
-    tasks: list[Task] = []
-    for mesh in (part.mesh for part in shells.parts):
-        taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
-        role = {mesh.name: provenance_of(registry, mesh)}
-        tasks += plan_cells([taken], [mesh], parameters, settings, plugins, role)
-    return tuple(tasks)
 
 
 @dataclass
@@ -206,7 +188,7 @@ class Maps:
         if extras:
             with self.reporter.busy("writing"):
                 notices = write_extras(self.file_options, mesh, uv, record)
-            told = tuple((self.file_options.remeshed or surface.path, one) for one in notices)
+            told = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
         return replace(mapped, written=written, told=told)
 

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cembench.api.settings import AnyPath, Faces, Timeout, registry_with
 from cembench.core.arguments import Range, checked
-from cembench.core.errors import ParameterError
+from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.morphing.landmarks import Landmarks
     from cembench.morphing.morph import Morph
+    from cembench.registry import Algorithm
+    from cembench.running.options import Options
     from cembench.running.surfaces import SurfaceInput
 
 
@@ -70,7 +75,8 @@ def morph(
     Returns
     -------
     Morph
-        ``morph.at(t)`` returns the first surface's vertices, float64 (n, 3), at a time from 0 to 1.
+        ``morph.at(t)`` returns the first surface's vertices, float64 (n, 3), at a time from 0 to 1,
+        and ``morph.save("film.gif")`` writes the path.
 
     Raises
     ------
@@ -94,27 +100,37 @@ def morph(
     from time import perf_counter
 
     from cembench.drawing.camera import viewpoints
+    from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.morphing.morph import morph as register_all
-    from cembench.morphing.surfaces_and_films import checked_maps, disk_with_landmarks
+    from cembench.running.options import Options
+    from cembench.running.surfaces import is_generated, load_surface
 
     if len(surfaces) < 2:
         raise ParameterError("a morph needs two surfaces or more; name at least one more.")
     registry = registry_with(plugins, reporter)
+    chosen = registry.algorithm(algorithm)
+    if chosen.target != "disk":
+        able = ", ".join(a.name for a in registry.algorithms.values() if a.target == "disk")
+        raise ParameterError(
+            f"{algorithm} maps to the target {chosen.target!r}; a morph needs the disk: {able}."
+        )
     meshes: list[DiskMesh] = []
     known: list[Mapping[str, int]] = []
     for surface in surfaces:
         what = os.fspath(surface) if isinstance(surface, str | os.PathLike) else "a surface"
         with reporter.busy(f"reading {what}"):
-            mesh, named = disk_with_landmarks(registry, surface, faces)
+            mesh = load_surface(surface, (DiskMesh,), faces=faces, registry=registry)
+        find = registry.surface(surface).landmarks if is_generated(surface, registry) else None
         for notice in mesh.notices:
             reporter.note(f"{mesh.name}: {notice}")
         meshes.append(mesh)
-        known.append(named)
+        known.append(find(mesh) if find else {})
     places = _places(landmarks, meshes, known)
     first, started = meshes[0], perf_counter()
     right, up, _ = viewpoints(first)["front"]
     with reporter.busy("mapping") as tell:
-        maps = checked_maps(registry, meshes, algorithm, parameters or {}, plugins, timeout, tell)
+        options = Options(timeout=timeout)
+        maps = [_mapped(chosen, mesh, parameters or {}, plugins, options, tell) for mesh in meshes]
         mapped = perf_counter()
         found = register_all(
             meshes,
@@ -128,6 +144,26 @@ def morph(
         )
     seconds = {"maps": mapped - started, "registration": perf_counter() - mapped}
     return replace(found, seconds=seconds)
+
+
+def _mapped(
+    algorithm: Algorithm,
+    mesh: DiskMesh,
+    parameters: Mapping[str, Any],
+    plugins: Sequence[str],
+    options: Options,
+    tell: Callable[[str], object],
+) -> NDArray[np.complex128]:
+    """Map a surface to the disk in a process of its own; raise if the map is not valid."""
+    from cembench.running.local import map_once
+    from cembench.running.plan import MeasurementSettings, plan_cells
+
+    (task,) = plan_cells([algorithm], [mesh], parameters, MeasurementSettings(repeats=1), plugins)
+    tell(f"{algorithm.title} on {mesh.name}")
+    record, uv = map_once(task, options)
+    if record.outcome.status != "ok" or uv is None:
+        raise AlgorithmFailed(f"{mesh.name}: {record.outcome.status}: {record.outcome.cause}")
+    return uv
 
 
 def _places(

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass, replace
 from functools import partial
+from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
 
@@ -20,7 +21,6 @@ from cembench.api.surface_collections import (
     provided,
     surfaces_of_archive,
     surfaces_of_folder,
-    surfaces_of_thingi10k,
 )
 from cembench.core.errors import ParameterError
 from cembench.mesh.datasets import Dataset, fetch_all, surface_file
@@ -35,8 +35,6 @@ from cembench.running.plan import Provenance, provenance_of, provenance_of_datas
 USUAL_LIMIT = 100
 #: Name of the exhibit that lists the surfaces of a run's sets.
 EXHIBIT = "surface-set"
-#: Registered name of the face model's surface family, and who published the model.
-FACE, FACE_SOURCE = "ict-face", "ICT-VGL/ICT-FaceKit"
 #: Environment variable for a folder with the set "corpus", which is otherwise fetched.
 CORPUS, CORPUS_VARIABLE = "corpus", "CEMBENCH_CORPUS"
 
@@ -47,39 +45,18 @@ def _quietly(dataset: Dataset) -> None:
     """Show no progress of a download."""
 
 
-@dataclass(frozen=True)
-class SurfaceSet:
-    """A named set: datasets of some groups, samples of the face model, or Thingi10K.
-
-    Parameters
-    ----------
-    title : str
-        Description of the set.
-    groups : tuple of str
-        Groups of datasets.
-    part : str
-        The part of the face model to sample; "" for none.
-
-    """
-
-    title: str
-    groups: tuple[str, ...] = ()
-    part: str = ""
-
-
-#: All named sets.
-SETS: Mapping[str, SurfaceSet] = MappingProxyType(
+#: Sets of datasets, by the groups of these. Entry points of :data:`SETS` name functions of the
+#: registry and a limit that yield the surfaces of others.
+GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
-        "real-disks": SurfaceSet("real disks, including models of the paper", ("paper", "disks")),
-        "real-holes": SurfaceSet("real surfaces with holes", ("holes",)),
-        "closed": SurfaceSet("real closed surfaces of genus 0, cut open", ("closed",)),
-        "stress": SurfaceSet("surfaces that are hard to map, or damaged", ("stress",)),
-        "ict-faces": SurfaceSet("faces of the ICT model, random expressions", part="disk"),
-        "ict-faces-holes": SurfaceSet("the same, with eyes and mouth as holes", part="face"),
-        "corpus": SurfaceSet("real surfaces of many repositories, by families", ("corpus",)),
-        "thingi10k": SurfaceSet("models for 3D printing, closed ones of genus 0 cut open"),
+        "real-disks": ("paper", "disks"),
+        "real-holes": ("holes",),
+        "closed": ("closed",),
+        "stress": ("stress",),
+        CORPUS: (CORPUS,),
     }
-)  # fmt: skip
+)
+SETS = "cembench.sets"
 
 
 def surfaces_of_set(
@@ -94,7 +71,8 @@ def surfaces_of_set(
     Parameters
     ----------
     name : str
-        A name in :data:`SETS`, or the path of a folder or archive with mesh files.
+        A name in :data:`GROUPS` or of an entry point, or the path of a folder or archive with
+        mesh files.
     registry : Registry
         The registry of datasets and surface families.
     limit : int, optional
@@ -122,16 +100,13 @@ def surfaces_of_set(
     """
     if name == CORPUS:
         name = os.environ.get(CORPUS_VARIABLE) or name
-    if name not in SETS:
-        return _of_path(name, limit)
-    chosen = SETS[name]
-    if chosen.groups:
-        return _of_datasets(
-            [d for group in chosen.groups for d in registry.group(group)][:limit], progress
-        )
-    if chosen.part:
-        return _of_face_model(registry, chosen.part, limit or USUAL_LIMIT)
-    return surfaces_of_thingi10k(limit=limit or USUAL_LIMIT)
+    if name in GROUPS:
+        chosen = [dataset for group in GROUPS[name] for dataset in registry.group(group)]
+        return _of_datasets(chosen[:limit], progress)
+    for entry in entry_points(group=SETS, name=name):
+        found: Iterator[Provided] = entry.load()(registry, limit or USUAL_LIMIT)
+        return found
+    return _of_path(name, limit)
 
 
 def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
@@ -140,8 +115,10 @@ def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
         return surfaces_of_folder(place, limit=limit)
     if place.is_file():
         return surfaces_of_archive(place, limit=limit)
+    known = [*GROUPS, *sorted(entry.name for entry in entry_points(group=SETS))]
     raise ParameterError(
-        f"there is no set {name!r}, and no folder or archive of that name; sets: {', '.join(SETS)}."
+        f"there is no set {name!r}, and no folder or archive of that name; sets: "
+        f"{', '.join(known)}."
     )
 
 
@@ -161,16 +138,6 @@ def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterato
 
 def _read(dataset: Dataset) -> TriangleMesh:
     return read_mesh(surface_file(dataset), TriangleMesh)
-
-
-def _of_face_model(registry: Registry, part: str, limit: int) -> Iterator[Provided]:
-    family = registry.surface(FACE)
-    for seed in range(limit):
-        given = family.arguments({"seed": seed, "expression": "random", "part": part})
-        mesh: TriangleMesh = family.function(**given)
-        name = f"{FACE}-{seed}" if part == "disk" else f"ict-{part}-{seed}"
-        about = Provenance(source=FACE_SOURCE, family=FACE)
-        yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT", provenance=about)
 
 
 @dataclass(frozen=True)

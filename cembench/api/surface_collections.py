@@ -1,4 +1,4 @@
-"""Collections of surfaces: a folder, an archive, or Thingi10K.
+"""Collections of surfaces: a folder or an archive.
 
 Each function yields surfaces that are ready to be mapped: disks and surfaces with holes as they
 are, closed surfaces of genus 0 cut open. Unusable surfaces are yielded too, with the reason, so
@@ -10,7 +10,6 @@ from __future__ import annotations
 import bz2
 import csv
 import gzip
-import importlib
 import lzma
 import tarfile
 import tempfile
@@ -23,7 +22,7 @@ from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import Any, BinaryIO, cast
 
-from cembench.core.errors import CembenchError, MeshError, ParameterError
+from cembench.core.errors import CembenchError, ParameterError
 from cembench.mesh.cut import cut_open
 from cembench.mesh.files import is_named_like_a_mesh, read_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -54,7 +53,7 @@ class Provided:
     name : str
         Its name, unique within a provider.
     source : str
-        Its origin: a path, a member of an archive, or a file of Thingi10K.
+        Its origin: a path, a member of an archive, or an entry of another collection.
     mesh : DiskMesh, HoledMesh or None
         The surface; None if it cannot be used.
     error : str
@@ -106,7 +105,7 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
         raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
     found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
     names, manifest = Names(), read_manifest(folder)
-    for path in _first(found, limit):
+    for path in first(found, limit):
         inside = path.relative_to(folder).with_suffix("").as_posix()
         row = manifest.get(inside, {})
         name = names.of(row.get("name") or inside.replace("/", "-"))
@@ -174,76 +173,13 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
     with tempfile.TemporaryDirectory() as folder:
         try:
             with closing(_members(path)) as members:
-                for member in _first(members, limit):
+                for member in first(members, limit):
                     yield _unpacked(member, names, Path(folder), path)
         except (zipfile.BadZipFile, tarfile.TarError, EOFError, *_DAMAGED, OSError) as error:
             raise ParameterError(
                 f"{path} cannot be read as an archive ({type(error).__name__}: {error}); name a "
                 "complete .zip, .tar, .tar.gz, .tar.bz2 or .tar.xz file."
             ) from None
-
-
-def surfaces_of_thingi10k(
-    *,
-    limit: int | None = 100,
-    license: str | None = "creative commons|public domain",
-    num_facets: tuple[int | None, int | None] = (1_000, 200_000),
-    genus: int | None = 0,
-    cache_dir: Path | None = None,
-    **filters: Any,
-) -> Iterator[Provided]:
-    """Yield surfaces of Thingi10K, models for 3D printing, through the package `thingi10k`.
-
-    Parameters
-    ----------
-    limit : int, optional
-        Maximum number of models; the package downloads the whole set once in any case.
-    license : str, optional
-        A regular expression that a model's licence must match; None for any licence.
-    num_facets : tuple
-        Minimum and maximum number of triangles.
-    genus : int, optional
-        Genus of closed models, which are cut open; None for all manifolds, also with boundary.
-    cache_dir : Path, optional
-        Folder in which the package stores the set.
-    **filters
-        Further filters of `thingi10k.dataset`, such as `category`, `num_boundary_edges`.
-
-    Raises
-    ------
-    ParameterError
-        The package is not installed, or cannot fetch the set.
-
-    """
-    try:
-        thingi10k = importlib.import_module("thingi10k")
-    except ImportError as error:
-        raise ParameterError(
-            f"the package thingi10k is not installed ({error}); run `pip install thingi10k`."
-        ) from None
-    wanted = {"license": license, "num_facets": num_facets, "genus": genus, "num_components": 1}
-    try:
-        thingi10k.init(variant="npz", cache_dir=None if cache_dir is None else str(cache_dir))
-        entries = thingi10k.dataset(manifold=True, oriented=True, **(wanted | filters))
-    except TypeError:
-        raise  # an unknown filter: the caller's mistake, reported by the package
-    except Exception as error:  # anything its libraries raise without a network
-        raise ParameterError(
-            f"thingi10k cannot fetch its models: {type(error).__name__}: {error}. Check the "
-            "network, or name a folder that holds them with cache_dir."
-        ) from error
-    for entry in _first(entries, limit):
-        name = f"thingi-{entry['file_id']}"
-        place = entry["file_path"]
-
-        def load(place: str = place, name: str = name) -> TriangleMesh:
-            try:
-                V, F = thingi10k.load_file(place)
-            except (OSError, ValueError) as error:
-                raise MeshError(f"{place}: {error}") from None
-            return TriangleMesh.from_arrays(V, F, name=name)
-
-        yield provided(name, f"Thingi10K {entry['file_id']}", load, str(entry["license"]))
 
 
 def provided(
@@ -279,7 +215,8 @@ class Names:
         return found
 
 
-def _first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
+def first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
+    """Yield the first items, or all without a limit."""
     for count, item in enumerate(items):
         if limit is not None and count >= limit:
             return

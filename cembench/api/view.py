@@ -22,22 +22,7 @@ def map_page(
 ) -> str:
     """Return the page of a map: a 3-D view, a picture for browsers without WebGL, the figures.
 
-    Parameters
-    ----------
-    mesh : TriangleMesh
-        The surface.
-    z : complex128 (n,)
-        The map.
-    outcome : Outcome
-        Result of the check.
-    algorithm : str
-        Title of the algorithm.
-
-    Returns
-    -------
-    str
-        HTML that needs no other file.
-
+    z (n,) is the map, `algorithm` its algorithm's title; the HTML needs no other file.
     """
     title = f"{mesh.name}: {algorithm}"
     about = caption(outcome.metrics)

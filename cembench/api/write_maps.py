@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from cembench.conformal.planar import orientations
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
+from cembench.core.wording import Advice
 from cembench.mesh.files import SINGLE, write_soup
 from cembench.mesh.formats import gltf, obj
 from cembench.mesh.soup import Soup, Texture, columns
@@ -29,45 +30,26 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class FileOptions:
-    """Options for writing a map.
+    """How a map is written, and what else is."""
 
-    Parameters
-    ----------
-    place : "unit" or "disk"
-        Placement of the texture coordinates.
-    checker : bool
-        Whether to add a checkerboard texture. GLB always has one.
-    bake : Path, optional
-        A texture for the file's own coordinates, to be repainted for the new ones.
-    equal : bool
-        Whether several surfaces get equal parts of the unit square, not parts by their areas.
-    samples, remeshed, page : Path, optional
-        Files for a geometry image, for the surface remeshed through the map, and for a page with a
-        view of both.
-    side : int
-        Samples along a side, for the first two.
-
-    """
-
+    #: Placement of the texture coordinates.
     place: Placement = "unit"
+    #: Whether to add a checkerboard texture. GLB always has one.
     checker: bool = False
+    #: A texture for the file's own coordinates, to be repainted for the new ones.
     bake: Path | None = None
+    #: Whether several surfaces get equal parts of the unit square, not parts by their areas.
     equal: bool = False
-    samples: Path | None = None
-    remeshed: Path | None = None
-    page: Path | None = None
+    #: Samples along a side, for `extras`.
     side: int = 129
+    #: The files besides the surfaces with their maps, by kind
+    #: (:data:`cembench.api.map_outputs.EXTRAS`).
+    extras: Mapping[str, Path] = field(default_factory=dict)
 
     @property
     def textured(self) -> bool:
         """Whether a texture file is written beside formats that cannot hold one."""
         return self.checker or self.bake is not None
-
-    @property
-    def extras(self) -> dict[str, Path]:
-        """The files besides the surfaces with their maps, by kind."""
-        named = {"geometry_image": self.samples, "remeshed": self.remeshed, "html": self.page}
-        return {what: path for what, path in named.items() if path is not None}
 
 
 def beside(output: Path, file_options: FileOptions) -> list[Path]:
@@ -98,29 +80,9 @@ def beside(output: Path, file_options: FileOptions) -> list[Path]:
 def save_map(
     output: Path, mesh: TriangleMesh, z: Complex, file_options: FileOptions | None = None
 ) -> tuple[Notice, ...]:
-    """Write a surface with its map as texture coordinates.
+    """Write a surface with its map z (n,) as texture coordinates to OBJ, PLY, GLB, VTP or NPZ.
 
-    Parameters
-    ----------
-    output : Path
-        OBJ, PLY, GLB, VTP or NPZ file.
-    mesh : TriangleMesh
-        The surface.
-    z : complex128 (n,)
-        The map.
-    file_options : FileOptions, optional
-        Placement of the coordinates, and the texture.
-
-    Returns
-    -------
-    tuple of Notice
-        A notice if rounding folds triangles in the file.
-
-    Raises
-    ------
-    MeshError, ParameterError, RenderError
-        A file cannot be written.
-
+    Returns a notice if rounding folds triangles in the file.
     """
     options = file_options or FileOptions()
     soup = Soup.of_triangles(mesh.V, mesh.F, placed(z, options.place), name=mesh.name)
@@ -170,7 +132,7 @@ def write_together(
         mesh, corners = file.uncut or file.mesh, file.mesh.F if file.uncut else None
         soups.append(Soup.of_triangles(mesh.V, mesh.F, z, corners, name=file.mesh.name))
     if output.suffix.lower() != ".glb":
-        soups = [_joined(soups)]
+        soups = [joined(soups)]
     return _save(output, soups, np.concatenate(maps), options)
 
 
@@ -215,7 +177,7 @@ def _save(
         write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
     else:
         write_soup(output, soups[0], image)
-    return _folded_by_rounding(output, maps, _joined(soups))
+    return _folded_by_rounding(output, maps, joined(soups))
 
 
 def _obj_text(soup: Soup, source: Shells | None) -> str:
@@ -241,15 +203,15 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | No
     if source is None or source.parts[0].repaired:
         raise ParameterError.about(
             "{bake} needs the faces of the original file, but the surface was repaired, or is not "
-            "of a file; run `cembench repair` to see what it changes, and fix the file so that it "
-            "keeps its UVs."
+            "of a file; {repair} shows what it changes. Fix the file so that it keeps its UVs.",
+            repair=Advice("`cembench.repair(surface).steps`", "`cembench repair`"),
         )
     old = uv_of_faces(source.path, soup.triangles)
     assert soup.uv is not None
     return baked_png(read_texture(options.bake), old, columns(soup.uv)[soup.uv_triangles])
 
 
-def _joined(parts: Sequence[Soup]) -> Soup:
+def joined(parts: Sequence[Soup]) -> Soup:
     """Return several surfaces joined into one mesh."""
     if len(parts) == 1:
         return parts[0]

@@ -24,8 +24,7 @@ MODULES = {
     "submit": ("submit", "submissions", "publish", "sign"),
     "validate": ("validate",),
     "peers": ("peers",),
-    "holes": ("holes",),
-    "theory": ("theory",),
+    "exhibits": (),  # those of papers
     "morph": ("morph",),
     "fetch": ("fetch",),
     "repair": ("repair",),

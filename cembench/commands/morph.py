@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.metadata import entry_points
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
@@ -57,15 +58,10 @@ def morph(
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.overwriting import refuse_inputs
     from cembench.morphing.drawing import check_views
-    from cembench.morphing.exhibit import write_morph_exhibits
-    from cembench.morphing.surfaces_and_films import (
-        rows_of_paper,
-        write_films,
-        write_path,
-    )
-    from cembench.morphing.writers import FILMS, check_output, files_of
+    from cembench.morphing.writers import check_output, files_of, is_film, write_path
     from cembench.registry import load_registry
     from cembench.results import run_folder
+    from cembench.running.plan import provenances
 
     chosen_views, given = split([views]), call.keywords
     check_views(chosen_views)
@@ -90,23 +86,23 @@ def morph(
         "reach": given["reach"],
         "frames": frames,
     } | found.metrics(frames)
-    films = [path for path in output if path.suffix.lower() in FILMS]
-    others = [path for path in output if path not in films]
+    kinds = {"frames": [o for o in output if not is_film(o)], "film": [*filter(is_film, output)]}
     written = list(output)
     with SHOWN.busy("writing") as tell:
-        if others:
-            with _timed(seconds, "frames"):
-                write_path(found, others, frames, tell)
-        if films:
-            with _timed(seconds, "film"):
-                write_films(found, films, frames, chosen_views, size, tell)
+        for kind, places in kinds.items():
+            if places:
+                with _timed(seconds, kind):
+                    write_path(found, places, frames, chosen_views, size, tell)
         if run is not None:
             words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
             words += ["-a", given["algorithm"]]
             words += [] if given["faces"] is None else ["--faces", str(given["faces"])]
             command = f"cembench morph {' '.join(words)} --run {run}"
-            rows = rows_of_paper(load_registry(given["plugins"]), surfaces)
-            written += write_morph_exhibits(run, found, figures, command, rows, tell)
+            registry = load_registry(given["plugins"])
+            roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
+            rows = tuple(roles[name].paper_row if name in roles else "" for name in surfaces)
+            for paper in entry_points(group="cembench.exhibits", name="morph"):
+                written += paper.load()(run, found, figures, command, rows, tell)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -126,10 +122,10 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
-    from cembench.morphing.exhibit import morph_tables
+    from cembench.morphing.metrics import tables_of
     from cembench.report.content.exhibits import exhibit_table
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")
-    for table in morph_tables(figures):
+    for table in tables_of(figures):
         out.print(exhibit_table(table, "", "surface"))

@@ -129,12 +129,8 @@ class PlainProgress(Watcher):
         self.remaining.machines = max(1, len(set(names)))
         self.shows(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
 
-    def says(self, words: str) -> None:
-        """Print what precision can be expected."""
-        self.shows(words)
-
     def shows(self, words: str) -> None:
-        """Print what happened on a cluster; a live display stays below it."""
+        """Print a remark; a live display stays below it."""
         self.console.print(words, markup=False, soft_wrap=True)
 
     def _say(self, line: str) -> None:

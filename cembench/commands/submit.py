@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import typer
 
 from cembench.api import submissions as api
-from cembench.api.submissions import Submission
 from cembench.commands.app import app
 from cembench.commands.console import Json, Markdown, err, out, print_json
 from cembench.commands.from_api import Call, from_api
@@ -19,6 +18,7 @@ from cembench.core.overwriting import refuse_inputs
 
 if TYPE_CHECKING:
     from cembench.report.document import Table
+    from cembench.results.bundle import Submission
 
 
 @app.command(
@@ -112,10 +112,8 @@ def publish(
     It needs no network and no server: open index.html, or put the folder on a web server.
     Bundles (see `cembench submit`) are checked first, and none is published that is refused.
     """
-    from dataclasses import asdict
-
-    from cembench.api.submissions import accepted, bundles_in, is_bundle
     from cembench.report.site import publish as write_site
+    from cembench.results.bundle import accepted, bundles_in, is_bundle
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 

@@ -26,6 +26,8 @@ Grid = Literal["square", "disk"]
 LEAST, MOST = 4, 8192
 #: Allowed distance of a disk map's boundary from the unit circle.
 _ON_CIRCLE = 1e-9
+#: A point this close to a triangle, relative to the size of the map, lies in it.
+_ROUNDING = 1e-14
 
 
 def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "square") -> Real:
@@ -73,7 +75,7 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "squa
     face, weights = locate(z, mesh.F, points.ravel(), nearest=grid == "square")
     found = np.full((side * side, 3), np.nan)
     inside = face >= 0
-    found[inside] = np.einsum("kc,kcd->kd", weights[inside], mesh.V[mesh.F[face[inside]]])
+    found[inside] = interpolated(weights[inside], mesh.V[mesh.F[face[inside]]])
     return found.reshape(side, side, 3)
 
 
@@ -120,7 +122,7 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh,
     clockwise = (np.conj(b - a) * (c - a)).imag < 0
     F[clockwise] = F[clockwise, ::-1]
     face, weights = locate(z, mesh.F, points, nearest=True)
-    V = np.einsum("kc,kcd->kd", weights, mesh.V[mesh.F[face]])
+    V = interpolated(weights, mesh.V[mesh.F[face]])
     return DiskMesh.from_arrays(V, F, name=mesh.name), points
 
 
@@ -145,19 +147,27 @@ def locate(z: Complex, F: Ints, points: Complex, *, nearest: bool = False) -> tu
         Barycentric coordinates, none negative.
 
     """
-    import shapely
+    import igl  # slow to load
 
-    corners = np.stack([z.real, z.imag], axis=1)[F]
-    rings = np.concatenate([corners, corners[:, :1]], axis=1)
-    tree = shapely.STRtree(shapely.polygons(rings))
-    places = shapely.points(points.real, points.imag)
-    face = np.full(len(points), -1, dtype=np.int64)
-    which, triangle = tree.query(places, predicate="intersects")
-    face[which[::-1]] = triangle[::-1]
-    if nearest:
-        lost = np.flatnonzero(face < 0)
-        face[lost] = tree.nearest(places[lost])
-    return face, _weights(z[F[face]], points)
+    squared, face, near = igl.point_mesh_squared_distance(_in_space(points), _in_space(z), F)
+    face = np.array(face, dtype=np.int64)
+    weights = _weights(z[F[face]], near[:, 0] + 1j * near[:, 1])
+    if not nearest:
+        face[squared > (_ROUNDING * np.abs(z).max()) ** 2] = -1
+    return face, weights
+
+
+def interpolated(weights: Real, corners: Real) -> Real:
+    """Return values (k, ...) interpolated in triangles, whose corners have `corners` (k, 3, ...).
+
+    `weights` (k, 3) are barycentric coordinates, as :func:`locate` returns them.
+    """
+    return np.asarray(np.einsum("kc,kc...->k...", weights, corners))
+
+
+def _in_space(z: Complex) -> Real:
+    # The library searches in space; its search in the plane is not faster.
+    return np.stack([z.real, z.imag, np.zeros(len(z))], axis=1)
 
 
 def square_to_disk(w: Complex) -> Complex:

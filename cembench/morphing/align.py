@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from scipy import ndimage, optimize
 
 from cembench.conformal.folds import interior_without_folds
+from cembench.conformal.gauge import gauge_measure, moved_to_gauge
 from cembench.conformal.moebius import Moebius
 from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.conformal.resample import interpolated, locate
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.morphing.transport import locate
 
 Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
@@ -61,14 +62,7 @@ def centred(mesh: DiskMesh, z: Complex, landmarks: Ints) -> Complex:
     """Return the map with the first landmark at 0, or else the conformal barycentre at 0."""
     if len(landmarks):
         return without_new_folds(mesh, to_centre(complex(z[landmarks[0]]))(z))
-    share = vertex_areas(mesh)
-    share = share / share.sum()
-    for _ in range(100):  # Abikoff's iteration for the conformal barycentre
-        middle = complex(share @ z)
-        z = to_centre(middle)(z)
-        if abs(middle) < 1e-10:
-            break
-    return without_new_folds(mesh, z)
+    return without_new_folds(mesh, moved_to_gauge(z, vertex_areas(mesh)))
 
 
 def aligned(
@@ -106,11 +100,8 @@ def aligned(
 
 
 def vertex_areas(mesh: DiskMesh) -> Real:
-    """Return the vertex areas (n,): a third of the area of the adjacent triangles."""
-    p, q, r = (mesh.V[mesh.F[:, c]] for c in range(3))
-    area = np.linalg.norm(np.cross(q - p, r - p), axis=1) / 6
-    total = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
-    return total.astype(np.float64)
+    """Return the share (n,) of each vertex in the surface's area: a third of that of its faces."""
+    return gauge_measure(mesh, "area", mesh.boundary)
 
 
 def _portrait(mesh: DiskMesh, z: Complex) -> Real:
@@ -122,8 +113,8 @@ def _portrait(mesh: DiskMesh, z: Complex) -> Real:
         mesh.F.ravel(), weights=np.repeat(signed_areas(z, mesh.F) / 3, 3), minlength=mesh.n
     )
     log_factor = np.log(vertex_areas(mesh) / image) / 2
-    at = locate(z, mesh.F, mesh.boundary, _grid())
-    portrait = at.carry(mesh.F, log_factor).reshape(RADII, DIRECTIONS)
+    face, weights = locate(z, mesh.F, _grid(), nearest=True)
+    portrait = interpolated(weights, log_factor[mesh.F[face]]).reshape(RADII, DIRECTIONS)
     return portrait - np.average(portrait, axis=0, weights=_radii()).mean()
 
 

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.metrics import dilatations, dirichlet_energy, flipped_triangles
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.registration import Registration
+from cembench.results.exhibits import ExhibitTable
 
 Ints = NDArray[np.int64]
 Real = NDArray[np.float64]
@@ -25,8 +27,7 @@ def size_of(V: Real) -> float:
 
 def mean_edge(mesh: DiskMesh) -> float:
     """Return the mean length of the triangles' sides."""
-    corners = mesh.V[mesh.F]
-    return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).mean())
+    return float(side_lengths(mesh.V, mesh.F).mean())
 
 
 def registration_metrics(
@@ -65,7 +66,10 @@ def registration_metrics(
     stretch = dilatations(target, registration.uv)
     apart = np.linalg.norm(carried[landmarks] - target.V[there], axis=1)
     edge = mean_edge(target)
-    there_and_back = distances(carried, F, target), distances_back(target, carried, F)
+    there_and_back = (
+        distances_to(_samples(carried, F), target.V, target.F),
+        distances_to(_samples(target.V, target.F), carried, F),
+    )
     figures: dict[str, Any] = {
         "landmark_error_share": float(apart.max() / size_of(target.V)) if len(landmarks) else None,
         "landmark_error_disk": registration.landmark_error if len(landmarks) else None,
@@ -87,16 +91,6 @@ def registration_metrics(
     return figures
 
 
-def distances(carried: Real, F: Ints, target: DiskMesh) -> Real:
-    """Return the distances of points on the carried surface from the target."""
-    return distances_to(_samples(carried, F), target.V, target.F)
-
-
-def distances_back(target: DiskMesh, carried: Real, F: Ints) -> Real:
-    """Return the distances of points on the target from the carried surface."""
-    return distances_to(_samples(target.V, target.F), carried, F)
-
-
 def _samples(V: Real, F: Ints) -> Real:
     """Return the vertices, and random points distributed evenly over the area."""
     rng = np.random.default_rng(0)
@@ -114,3 +108,38 @@ def distances_to(points: Real, V: Real, F: Ints) -> Real:
 
     squared, _, _ = igl.point_mesh_squared_distance(points, np.ascontiguousarray(V), F)
     return np.sqrt(squared)
+
+
+#: The figures of a registration: the heading and the format of each.
+_REGISTRATION = {
+    "surface": ("surface", ""),
+    "steps": ("steps to lambda", "d"),
+    "landmark_error_share": ("landmark error / size", ".2e"),
+    "dirichlet_energy": ("E_D", ".4f"),
+    "dilatation_mean": ("mean dilatation", ".2f"),
+    "dilatation_max": ("maximum dilatation", ".1f"),
+    "flipped_triangles": ("folds", "d"),
+    "distance_mean_edges": ("mean distance / edge", ".3f"),
+    "hausdorff_edges": ("Hausdorff / edge", ".2f"),
+}
+
+
+def tables_of(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
+    """Return the metrics of the registrations, one row per surface, and those of the path."""
+    rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
+    registrations = ExhibitTable.of(
+        "Registrations",
+        _REGISTRATION,
+        rows,
+        notes=(
+            "Distances between the carried surface and its target, the larger of both ways, over "
+            "all vertices and 50,000 random points each, in mean edges of the target. A dash: no "
+            "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
+        ),
+    )
+    path = {
+        "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
+        "largest_step_share": ("largest step between frames", ".4f"),
+    }
+    note = "In sizes of the first surface; the time from the first to the last is 1."
+    return registrations, ExhibitTable.of("Smoothness of the path", path, [figures], notes=(note,))

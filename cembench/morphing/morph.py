@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.resample import interpolated, locate
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.align import aligned, best_turn, centred, vertex_areas
 from cembench.morphing.landmarks import Landmarks, check_order
 from cembench.morphing.metrics import registration_metrics, size_of
 from cembench.morphing.path import largest_acceleration, largest_step, pose_of, position
 from cembench.morphing.registration import LAMBDA, REACH, Registration, register
-from cembench.morphing.transport import locate
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
@@ -60,6 +62,48 @@ class Morph:
     def at(self, time: float) -> Real:
         """Return the first surface's vertices, float64 (n, 3), at a time from 0 to 1."""
         return position(self.stops, time)
+
+    def save(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        frames: int = 48,
+        views: Sequence[str] = ("front", "side", "three-quarter"),
+        size: int = 480,
+    ) -> list[Path]:
+        """Write the path as a film, as numbered meshes, or as arrays.
+
+        Parameters
+        ----------
+        path : path
+            A film (GIF or MP4, 24 frames a second), a mesh file (OBJ or PLY) whose name gets a
+            number for each frame, a folder for PLY meshes, or NPZ for all frames as arrays.
+        frames : int
+            Number of frames.
+        views : sequence of {"front", "side", "three-quarter"}
+            Views of a film.
+        size : int
+            Side of a view of a film, in pixels.
+
+        Returns
+        -------
+        list of Path
+            The files.
+
+        Raises
+        ------
+        ParameterError
+            The suffix or a view is unknown, or the folder does not exist.
+        RecordError
+            A file cannot be written.
+        MissingExtra
+            MP4 needs a package that is not installed.
+
+        """
+        from cembench.morphing.writers import files_of, write_path
+
+        write_path(self, [Path(path)], frames, views, size)
+        return files_of(Path(path), frames)
 
     def metrics(self, frames: int) -> dict[str, Any]:
         """Return the metrics of the registrations and of the path with this many frames.
@@ -137,8 +181,8 @@ def morph(
         check_order(landmarks.names, z[places[:, 0]], fitted[there], (first.name, mesh.name))
         registration = register(mesh, fitted, there, z[places[:, 0]], lam=lam, reach=reach)
         tell(f"carrying {first.name} onto {mesh.name}")
-        at = locate(registration.uv, mesh.F, mesh.boundary, z)
-        on = at.carry(mesh.F, mesh.V)
+        face, weights = locate(registration.uv, mesh.F, z, nearest=True)
+        on = interpolated(weights, mesh.V[mesh.F[face]])
         moved.append(fitted)
         registrations.append(registration)
         carried.append(on)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,10 @@ from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.morphing.drawing import draw_film
+
+if TYPE_CHECKING:
+    from cembench.morphing.morph import Morph
 
 Real = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
@@ -31,15 +35,20 @@ def check_output(path: Path) -> None:
     suffix = path.suffix.lower()
     if suffix not in (*FILMS, *MESHES, *ARRAYS, ""):
         raise ParameterError(
-            f"-o {path}: {suffix!r} is unknown; allowed: .gif or .mp4 for a film, .obj or .ply for "
+            f"{path}: {suffix!r} is unknown; allowed: .gif or .mp4 for a film, .obj or .ply for "
             "numbered meshes, a folder for PLY meshes, .npz for arrays."
         )
     if suffix == ".mp4":
-        require(Extra.VIDEO, f"-o {path}: MP4, unlike GIF,")
+        require(Extra.VIDEO, f"{path}: MP4, unlike GIF,")
     if suffix and not path.parent.is_dir():
-        raise ParameterError(f"-o {path}: there is no folder {path.parent}. Make it first.")
+        raise ParameterError(f"{path}: there is no folder {path.parent}. Make it first.")
     if not suffix and path.is_file():
-        raise ParameterError(f"-o {path} is a file, not a folder; name another place.")
+        raise ParameterError(f"{path} is a file, not a folder; name another place.")
+
+
+def is_film(path: Path) -> bool:
+    """Whether an output is a film."""
+    return path.suffix.lower() in FILMS and not path.is_dir()
 
 
 def files_of(path: Path, frames: int) -> list[Path]:
@@ -47,6 +56,36 @@ def files_of(path: Path, frames: int) -> list[Path]:
     if path.suffix.lower() in (*FILMS, *ARRAYS) and not path.is_dir():
         return [path]
     return mesh_files(path, frames)
+
+
+def write_path(
+    morph: Morph,
+    outputs: Sequence[Path],
+    frames: int,
+    views: Sequence[str],
+    size: int,
+    tell: Callable[[str], object] = lambda words: None,
+) -> None:
+    """Write a path to every output; a film is drawn once for all.
+
+    `size` is the side of a view in pixels; `tell` is called with each frame.
+    """
+    for path in outputs:
+        check_output(path)
+    times, first = np.linspace(0, 1, frames), morph.meshes[0]
+
+    def tell_frame(frame: int) -> None:
+        tell(f"frame {frame + 1} of {frames}")
+
+    if any(map(is_film, outputs)):
+        pictures = draw_film(first, morph.stops, times, views, size, tell_frame)
+    for path in outputs:
+        if is_film(path):
+            write_film(path, pictures)
+        elif path.suffix.lower() in ARRAYS and not path.is_dir():
+            write_arrays(path, first, times, morph.at)
+        else:
+            write_meshes(path, first, times, morph.at, tell_frame)
 
 
 def write_film(path: Path, pictures: Pictures) -> None:

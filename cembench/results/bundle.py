@@ -17,24 +17,31 @@ import hashlib
 import json
 import re
 import stat
+import tempfile
 import zipfile
+import zlib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from statistics import median
 from typing import Any
 from urllib.parse import quote, unquote
 
-from cembench.core.atomic import write
+from cembench.core.atomic import write_bytes
 from cembench.core.errors import RecordError
 from cembench.core.loading import damaged, files_in, is_there, read_bytes
-from cembench.results.machines import Environments, machine_of
+from cembench.core.names import distinct_slugs
+from cembench.results.machines import machine_of, machine_of_record
 from cembench.results.records import Record
 from cembench.results.run_folder import SIGNATURE
+from cembench.results.signing import signature_of, signer
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
 
+#: How the file of a bundle ends.
+SUFFIX = ".zip"
 #: The file of metadata, and the version of RO-Crate that it follows.
 METADATA, ROCRATE = "ro-crate-metadata.json", "https://w3id.org/ro/crate/1.1"
 #: At most this many files, and bytes once unpacked: of the archive and of each archive of arrays.
@@ -57,88 +64,111 @@ _SLACK = 1.05
 
 
 @dataclass(frozen=True)
-class Bundle:
-    """A bundle that was unpacked, and what is wrong with it."""
-
-    name: str
-    store: Store
-    records: tuple[Record, ...]
-    environments: Environments
-    faults: tuple[str, ...]
-
-    @property
-    def machines(self) -> tuple[str, ...]:
-        """The names of the machines, as they named themselves."""
-        used = sorted({record.environment for record in self.records})
-        return tuple(dict.fromkeys(machine_of(self.environments.get(key, {})) for key in used))
-
-    @property
-    def signed(self) -> bool:
-        """Whether it has a signature; by whom is for :func:`cembench.results.signing.signer`."""
-        return (self.store.folder / SIGNATURE).is_file()
-
-
-def contents(run: Store, *, maps: bool, surfaces: Mapping[str, str]) -> dict[str, bytes]:
-    """Return the files of a run that are sent, by their names in the bundle.
+class Submission:
+    """A bundle that was checked.
 
     Parameters
     ----------
-    run : Store
-        The run.
-    maps : bool
-        Whether the maps are sent, and the surfaces whose licence is known with them.
-    surfaces : mapping
-        The licence of each surface by its hash; "" if none is stated.
+    name : str
+        Its file's name without the suffix.
+    faults : tuple of str
+        Why it is refused; empty if it is accepted.
+    cells : int
+        The number of its records.
+    machines : tuple of str
+        The machines, as they named themselves.
+    maps : int
+        The number of maps whose figures were computed again.
+    signer : str
+        Who signed it, if that was asked for.
+
+    Examples
+    --------
+    >>> from cembench import Submission
+    >>> Submission("mine", faults=("it holds no record",)).accepted
+    False
 
     """
-    places = [
-        *run.record_files(),
-        *files_in(run.folder / "environments", "*.json", run.folder),
-    ]
-    if maps:
-        free = {
-            run.mesh_file(r.cell): None for r in run.records() if surfaces.get(r.cell.mesh_hash)
-        }
-        places += files_in(run.folder / "maps", "*.npz", run.folder)
-        places += [place for place in free if is_there(place)]
-    return {
-        place.relative_to(run.folder).as_posix(): read_bytes(place, run.folder) for place in places
-    }
+
+    name: str
+    faults: tuple[str, ...] = ()
+    cells: int = 0
+    machines: tuple[str, ...] = ()
+    maps: int = 0
+    signer: str = ""
+
+    @property
+    def accepted(self) -> bool:
+        """Whether there is no fault."""
+        return not self.faults
 
 
 def pack(
-    files: Mapping[str, bytes],
     run: Store,
     path: Path,
-    about: Mapping[str, Any],
+    *,
+    maps: bool,
+    licence: str,
+    author: str,
     surfaces: Mapping[str, str],
-) -> None:
-    """Write the files of a run as a bundle.
+    key: Path | None,
+) -> Submission:
+    """Write a run as a bundle, and check it as a collection will.
 
     Parameters
     ----------
-    files : mapping
-        The content of each file by its name, as :func:`contents` returns them.
     run : Store
         The run.
     path : Path
         The file to write.
-    about : mapping
-        Of the bundle: its name, licence, and author ("" if not named).
+    maps : bool
+        Whether the maps are sent, and the surfaces whose licence is known with them.
+    licence, author : str
+        Of the bundle; the author may be "".
     surfaces : mapping
         The licence of each surface by its hash; "" if none is stated.
+    key : Path, optional
+        The SSH key that signs it.
+
+    Raises
+    ------
+    RecordError
+        A collection would refuse it.
 
     """
-    graph = _crate(run, files, about, surfaces)
-    crate = json.dumps({"@context": _CONTEXT, "@graph": graph}, indent=1).encode()
-
-    def fill(file: Any) -> None:
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in {**files, METADATA: crate}.items():
+    files = _contents(run, surfaces if maps else None)
+    if key is not None:
+        files[SIGNATURE] = signature_of(files, key)
+    about = {"name": path.stem, "licence": licence, "author": author}
+    crate = {"@context": _CONTEXT, "@graph": _crate(run, files, about, surfaces)}
+    with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
+        draft = Path(folder) / path.name
+        with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
+            for name, content in {**files, METADATA: json.dumps(crate, indent=1).encode()}.items():
                 # Of a fixed date: equal runs give equal bytes.
                 archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
+        with unpacked([draft]) as found:
+            (sent,) = found.values()
+        if sent.faults:
+            raise RecordError(
+                f"{run.folder} was not packed, as a collection would refuse it:\n"
+                + "\n".join(f"  {fault}" for fault in sent.faults[:10])
+                + "\nMeasure these cells again, with `cembench run`."
+            )
+        write_bytes(path, draft.read_bytes())
+    return sent
 
-    write(path, fill)
+
+def _contents(run: Store, surfaces: Mapping[str, str] | None) -> dict[str, bytes]:
+    """Return the files of a run that are sent, by their names; with `surfaces` the maps, too."""
+    folder = run.folder
+    places = [*run.record_files(), *files_in(folder / "environments", "*.json", folder)]
+    if surfaces is not None:
+        cells = [record.cell for record in run.records()]
+        free = dict.fromkeys(run.mesh_file(c) for c in cells if surfaces.get(c.mesh_hash))
+        places += files_in(folder / "maps", "*.npz", folder)
+        places += filter(is_there, free)
+    return {place.relative_to(folder).as_posix(): read_bytes(place, folder) for place in places}
 
 
 #: RO-Crate 1.1 has no name for a hash; schema.org does.
@@ -148,83 +178,154 @@ _CONTEXT = [f"{ROCRATE}/context", {"sha256": "https://schema.org/sha256"}]
 def _crate(
     store: Store,
     files: Mapping[str, bytes],
-    about: Mapping[str, Any],
+    about: Mapping[str, str],
     surfaces: Mapping[str, str],
 ) -> list[dict[str, Any]]:
     """Return the entities of the metadata."""
     records, environments = store.records(), store.environments()
-    spdx = {name: f"https://spdx.org/licenses/{name}" for name in surfaces.values() if name}
-    spdx[about["licence"]] = f"https://spdx.org/licenses/{about['licence']}"
+    licences = {name for name in (*surfaces.values(), about["licence"]) if name}
     meshes = {record.cell.mesh_hash: record.cell.mesh for record in records}
     started = sorted(record.started_at for record in records)
-    tools = [f"#environment-{key}" for key in environments]
-    author = [{"@id": "#author", "@type": "Person", "name": about["author"]}]
+    author = about["author"] and "#author"
     return [
-        {
-            **_entity(METADATA, "CreativeWork"),
-            "conformsTo": {"@id": ROCRATE},
-            "about": {"@id": "./"},
-        },
-        {
-            **_entity("./", "Dataset", about["name"]),
-            "description": f"{len(records)} measurements of conformal parameterization, as "
-            "records of cembench.",
-            "datePublished": started[-1][:10],
-            "license": {"@id": spdx[about["licence"]]},
-            "hasPart": [{"@id": quote(name)} for name in files],
-            **({"author": {"@id": "#author"}} if about["author"] else {}),
-        },
-        *(author if about["author"] else []),
-        {
-            **_entity("#run", "CreateAction", "measurement"),
-            "startTime": started[0],
-            "endTime": started[-1],
-            "instrument": [{"@id": tool} for tool in tools],
-            "object": [{"@id": f"#surface-{key[:16]}"} for key in meshes],
-            "result": {"@id": "./"},
-        },
-        *(_tool(*item) for item in zip(tools, environments.values(), strict=True)),
+        _entity(METADATA, "CreativeWork", conformsTo=_ref(ROCRATE), about=_ref("./")),
+        _entity(
+            "./",
+            "Dataset",
+            name=about["name"],
+            description=f"{len(records)} measurements of conformal parameterization, as records of "
+            "cembench.",
+            datePublished=started[-1][:10],
+            license=_ref(_spdx(about["licence"])),
+            hasPart=[_ref(quote(name)) for name in files],
+            author=author and _ref(author),
+        ),
+        *([_entity(author, "Person", name=about["author"])] if author else []),
+        _entity(
+            "#run",
+            "CreateAction",
+            name="measurement",
+            startTime=started[0],
+            endTime=started[-1],
+            instrument=[_ref(f"#environment-{key}") for key in environments],
+            object=[_ref(f"#surface-{key[:16]}") for key in meshes],
+            result=_ref("./"),
+        ),
+        *(_tool(f"#environment-{key}", one) for key, one in environments.items()),
         *(
-            {
-                **_entity(f"#surface-{key[:16]}", "CreativeWork", name),
-                "identifier": key,
-                **({"license": {"@id": spdx[licence]}} if (licence := surfaces.get(key)) else {}),
-            }
+            _entity(
+                f"#surface-{key[:16]}",
+                "CreativeWork",
+                name=name,
+                identifier=key,
+                license=(licence := surfaces.get(key)) and _ref(_spdx(licence)),
+            )
             for key, name in meshes.items()
         ),
-        *(_entity(address, "CreativeWork", name) for name, address in spdx.items()),
+        *(_entity(_spdx(name), "CreativeWork", name=name) for name in sorted(licences)),
         *(
-            {
-                **_entity(quote(name), "File"),
-                "encodingFormat": _TYPES.get(Path(name).suffix, "application/octet-stream"),
-                "contentSize": str(len(content)),
-                "sha256": hashlib.sha256(content).hexdigest(),
-            }
+            _entity(
+                quote(name),
+                "File",
+                encodingFormat=_TYPES.get(Path(name).suffix, "application/octet-stream"),
+                contentSize=str(len(content)),
+                sha256=hashlib.sha256(content).hexdigest(),
+            )
             for name, content in files.items()
         ),
     ]
 
 
-def _entity(place: str, kind: str, name: str = "") -> dict[str, Any]:
-    return {"@id": place, "@type": kind} | ({"name": name} if name else {})
+def _entity(place: str, kind: str, **fields: Any) -> dict[str, Any]:
+    """Return an entity of the metadata; empty fields are left out."""
+    return {"@id": place, "@type": kind} | {name: one for name, one in fields.items() if one}
+
+
+def _ref(place: str) -> dict[str, str]:
+    return {"@id": place}
+
+
+def _spdx(licence: str) -> str:
+    return f"https://spdx.org/licenses/{licence}"
 
 
 def _tool(place: str, environment: Mapping[str, Any]) -> dict[str, Any]:
     """Return the software and the machine of an environment."""
     libraries = environment.get("libraries") or {}
-    git = environment.get("git") or {}
-    return {
-        **_entity(place, "SoftwareApplication", "cembench"),
-        "softwareVersion": str(environment.get("cembench") or "unknown"),
-        "identifier": str(git.get("commit") or ""),
-        "softwareRequirements": [f"{name} {found}" for name, found in libraries.items() if found],
-        "operatingSystem": str(environment.get("platform") or ""),
-        "processorRequirements": machine_of(environment) + f": {environment.get('cpu') or ''}",
-    }
+    return _entity(
+        place,
+        "SoftwareApplication",
+        name="cembench",
+        softwareVersion=str(environment.get("cembench") or "unknown"),
+        identifier=(environment.get("git") or {}).get("commit"),
+        softwareRequirements=[f"{name} {found}" for name, found in libraries.items() if found],
+        operatingSystem=environment.get("platform"),
+        processorRequirements=machine_of(environment) + f": {environment.get('cpu') or ''}",
+    )
 
 
-def unpack(path: Path, folder: Path) -> Bundle:
-    """Unpack a bundle into an empty folder and check it.
+def bundles_in(place: Path) -> list[Path]:
+    """Return the bundles in a folder, or the one that a file is; raise where there is none."""
+    found = [place] if place.is_file() else files_in(place, f"*{SUFFIX}")
+    if not found:
+        raise RecordError(
+            f"{place} holds no bundle, which are files *{SUFFIX}. Make one with `cembench submit`."
+        )
+    return found
+
+
+def is_bundle(place: Path) -> bool:
+    """Whether a path is a bundle, or a folder of bundles that is no run."""
+    if place.is_dir() and not (place / "records").exists():
+        return any(path.suffix == SUFFIX for path in place.iterdir())
+    return place.is_file()
+
+
+@contextmanager
+def accepted(paths: Sequence[Path]) -> Iterator[list[Path]]:
+    """Unpack bundles into temporary folders; raise :class:`RecordError` if one is refused."""
+    with unpacked(paths) as found:
+        refused = [f"  {one.name}: {one.faults[0]}" for one in found.values() if one.faults]
+        if refused:
+            raise RecordError(
+                "some bundles are refused:\n"
+                + "\n".join(refused)
+                + "\nLeave them out; `cembench submissions check` lists all that is wrong."
+            )
+        yield list(found)
+
+
+@contextmanager
+def unpacked(
+    paths: Sequence[Path], signers: Path | None = None
+) -> Iterator[dict[Path, Submission]]:
+    """Unpack bundles into temporary folders and check them; yield what was found, by folder.
+
+    With `signers`, a file of allowed ones, each has to be signed by one of them.
+    """
+    names = distinct_slugs({str(path): path.stem for path in paths})
+    found: dict[Path, Submission] = {}
+    records: dict[str, Sequence[Record]] = {}
+    with tempfile.TemporaryDirectory(prefix="cembench-") as above:
+        for path in paths:
+            name = names[str(path)]
+            folder = Path(above) / name
+            folder.mkdir()
+            try:
+                found[folder], records[name] = _checked(name, path, folder)
+                if signers is not None and found[folder].accepted:
+                    found[folder] = replace(found[folder], signer=signer(folder, signers))
+            except RecordError as error:
+                about = found.get(folder, Submission(name))
+                found[folder] = replace(about, faults=(str(error),))
+        sound = {one.name: records[one.name] for one in found.values() if one.accepted}
+        for name, far in far_from_others(sound).items():
+            found[Path(above) / name] = replace(found[Path(above) / name], faults=tuple(far))
+        yield found
+
+
+def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[Record]]:
+    """Unpack a bundle into an empty folder and check it; return its records, too.
 
     Raises
     ------
@@ -235,60 +336,54 @@ def unpack(path: Path, folder: Path) -> Bundle:
     try:
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-            _refuse(path, members)
-            for member in members:
-                archive.extract(member, folder)
-    except (OSError, zipfile.BadZipFile, EOFError, ValueError, NotImplementedError) as error:
-        raise damaged(path, "a bundle", error) from error
-    except Exception as error:  # zlib has an error of its own
-        if isinstance(error, RecordError):
-            raise
+            for what in _unsafe(members):
+                raise RecordError(
+                    f"{path} was not unpacked: {what}. Bundles are made by `cembench submit`; ask "
+                    "its sender for another."
+                )
+            archive.extractall(folder, members)
+    except (OSError, zipfile.BadZipFile, EOFError, ValueError, RuntimeError, zlib.error) as error:
         raise damaged(path, "a bundle", error) from error
     faults = [*_other_files(folder, [member.filename for member in members]), *_large(folder)]
     if faults:
-        return Bundle(path.stem, Store(folder), (), {}, tuple(faults))
+        return Submission(name, tuple(faults)), ()
     store = Store(folder)
-    verified = verify(store, Depth.everything)
+    verified, environments = verify(store, Depth.everything), store.environments()
     faults = [str(finding) for finding in verified.disagreements]
-    environments = store.environments()
     if not verified.records and not faults:
         faults = ["it holds no record"]
+    maps, machines = 0, {}
     for record in verified.records:
-        told = f"{record.cell.label}: "
-        if record.environment not in environments:
-            faults.append(f"{told}its environment {record.environment} is not there")
-        hardware = environments.get(record.environment, {}).get("hardware_threads")
-        faults += [told + why for why in implausible(record, hardware)]
-    return Bundle(path.stem, store, verified.records, environments, tuple(faults))
+        cell, environment = record.cell, environments.get(record.environment)
+        if environment is None:
+            faults.append(f"{cell.label}: its environment {record.environment} is not there")
+        hardware = (environment or {}).get("hardware_threads")
+        faults += [f"{cell.label}: {why}" for why in implausible(record, hardware)]
+        maps += store.map_file(cell).is_file() and store.mesh_file(cell).is_file()
+        machines[record.environment] = machine_of_record(record, environments)
+    named = tuple(dict.fromkeys(machines[key] for key in sorted(machines)))
+    count = len(verified.records)
+    return Submission(name, tuple(faults), count, named, maps), verified.records
 
 
-def _refuse(path: Path, members: Sequence[zipfile.ZipInfo]) -> None:
-    """Raise :class:`RecordError` if an archive may not be unpacked; only its list was read."""
-
-    def refused(what: str) -> RecordError:
-        return RecordError(
-            f"{path} was not unpacked: {what}. Bundles are made by `cembench submit`; ask its "
-            "sender for another."
-        )
-
+def _unsafe(members: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
+    """Yield why an archive must not be unpacked; only its list was read."""
     if len(members) > MOST_FILES:
-        raise refused(f"it holds {len(members):,} files, of at most {MOST_FILES:,}")
+        yield f"it holds {len(members):,} files, of at most {MOST_FILES:,}"
     if (size := sum(member.file_size for member in members)) > MOST_BYTES:
-        raise refused(f"its files have {size:,} bytes, of at most {MOST_BYTES:,}")
+        yield f"its files have {size:,} bytes, of at most {MOST_BYTES:,}"
     names: set[str] = set()
     for member in members:
         mode, name = member.external_attr >> 16, member.filename
         if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
-            raise refused(f"{name!r} is a link or not a regular file")
+            yield f"{name!r} is a link or not a regular file"
         if not _NAMES.fullmatch(name) or name != member.orig_filename or not name.isprintable():
-            raise refused(f"{member.orig_filename!r} is no name of a bundle's files")
+            yield f"{member.orig_filename!r} is no name of a bundle's files"
         if name.casefold() in names:
-            raise refused(f"{name!r} is there twice")
-        if member.flag_bits & 1 or member.compress_type not in (
-            zipfile.ZIP_STORED,
-            zipfile.ZIP_DEFLATED,
-        ):
-            raise refused(f"{name!r} is encrypted, or compressed in an unusual way")
+            yield f"{name!r} is there twice"
+        packed = member.compress_type in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+        if member.flag_bits & 1 or not packed:
+            yield f"{name!r} is encrypted, or compressed in an unusual way"
         names.add(name.casefold())
 
 
@@ -366,27 +461,25 @@ def implausible(record: Record, hardware_threads: int | None = None) -> Iterator
             yield f"round {k}: more CPU seconds than {hardware_threads} hardware threads have"
 
 
-def far_from_others(bundles: Sequence[Bundle]) -> dict[str, list[str]]:
+def far_from_others(records: Mapping[str, Sequence[Record]]) -> dict[str, list[str]]:
     """Return, by bundle, the cells whose seconds are far from those of all other machines.
 
     Compared are seconds over those of the reference kernel, cell by cell: the same surface, source
-    and settings.
+    and settings. `records` are those of each bundle.
     """
     scaled: dict[str, dict[str, tuple[float, str]]] = {}
-    for bundle in bundles:
-        for record in bundle.records:
-            if not bundle.faults and (units := kernel_units(record)) is not None:
-                scaled.setdefault(record.cell.key, {})[bundle.name] = units, record.cell.label
+    for name, own in records.items():
+        for record in own:
+            if (units := kernel_units(record)) is not None:
+                scaled.setdefault(record.cell.key, {})[name] = units, record.cell.label
     found: dict[str, list[str]] = {}
     for by_bundle in scaled.values():
-        for name, (own, label) in by_bundle.items():
-            others = [units for other, (units, _) in by_bundle.items() if other != name]
-            if len(others) < OTHERS:
-                continue
-            usual = median(others)
-            if not usual / APART <= own <= usual * APART:
+        for name, (units, label) in by_bundle.items():
+            others = [other for one, (other, _) in by_bundle.items() if one != name]
+            usual = median(others) if others else units
+            if len(others) >= OTHERS and not usual / APART <= units <= usual * APART:
                 found.setdefault(name, []).append(
-                    f"{label}: {own:.3g} times the reference kernel's seconds; on "
+                    f"{label}: {units:.3g} times the reference kernel's seconds; on "
                     f"{len(others)} other machines {usual:.3g}"
                 )
     return found

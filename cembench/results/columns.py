@@ -58,7 +58,11 @@ def marks_explained(records: list[Record]) -> list[str]:
 
 def solve_words(record: Record) -> str:
     """Return the origin of a program's solve time."""
-    return "by its own word" if record.outcome.own_seconds is not None else "wall less start"
+    return (
+        "printed by the program"
+        if record.outcome.own_seconds is not None
+        else "wall clock less start"
+    )
 
 
 def seconds_words(record: Record) -> str:

@@ -6,6 +6,7 @@ Examples are the steps of Koebe's method, a morph, or a test of the theory. A co
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, Self
@@ -91,6 +92,16 @@ class Exhibit(BaseModel):
     pictures: tuple[ExhibitPicture, ...] = ()
     tables: tuple[ExhibitTable, ...] = ()
     facts: dict[str, Any] = {}
+
+
+def command(verb: str, surface: Any, mesh_name: str, **settings: float | str | None) -> str:
+    """Return the command line that makes an exhibit of a surface again.
+
+    A surface that is no path goes by the name of its mesh.
+    """
+    name = Path(surface).name if isinstance(surface, str | os.PathLike) else mesh_name
+    options = [f"--{name} {value}" for name, value in settings.items() if value is not None]
+    return " ".join(["cembench", verb, name, *options])
 
 
 def exhibit_folder(run: Path, name: str) -> Path:

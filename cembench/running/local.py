@@ -136,7 +136,6 @@ class _Run:
         most_rounds = self.options.most_rounds
         self.watcher.begins(sum(state.processes_left(most_rounds) for state in cells))
         self._check_all(cells)
-        self.watcher.timing_starts()
         self._choose_pairing([state for state in cells if state.record is None])
         last = max((state.task.cell.repeats or most_rounds for state in cells), default=0)
         for number in range(last + 1):
@@ -262,7 +261,7 @@ class _Run:
         scatter = Scatter.of(pairs)
         if asked == "auto":
             self.pairs = scatter.pairing_is_narrower
-        self.watcher.says(scatter.words(prices, self._seconds_left(), pairs=self.pairs))
+        self.watcher.shows(scatter.words(prices, self._seconds_left(), pairs=self.pairs))
 
     def _time_group(self, cells: Sequence[CellState], number: int, kernel: float) -> None:
         """Time each cell in a process of its own, and after that all of them in one."""

@@ -68,12 +68,12 @@ class ProcessEnd:
     def how(self) -> str:
         """A description of the end: the signal, or the exit code with the last line of output."""
         if self.code < 0:
-            return f"was ended by signal {_signal_name(-self.code)}"
+            return f"was ended by signal {signal_name(-self.code)}"
         last = f": {self.said.splitlines()[-1]}" if self.said else ""
         return f"ended with code {self.code}{last}"
 
 
-def _signal_name(number: int) -> str:
+def signal_name(number: int) -> str:
     """Return the name of a signal, or its number: most real-time signals have no name."""
     try:
         return signal.Signals(number).name
@@ -161,7 +161,7 @@ def run_limited(
             _follow(tree, process.pid)
         code, left = _end_all(process, tree, *(("", 0) if alone else (mark, inherited)))
     with suppress(OSError), log.open("rb") as file:  # the process may have removed it
-        said = (said + _end_of(file))[-KEPT_OUTPUT_BYTES:]
+        said = (said + end_of(file))[-KEPT_OUTPUT_BYTES:]
     output = said.decode(errors="replace").strip()
     return ProcessEnd(code, limit, seen, output, left, tuple(running))
 
@@ -207,14 +207,15 @@ def _drain(log: Path, said: bytes) -> bytes:
     with suppress(OSError):  # the process may have removed it
         if log.stat().st_size > _LARGEST_LOG_BYTES:
             with log.open("rb") as file:
-                said = _end_of(file)
+                said = end_of(file)
             os.truncate(log, 0)
     return said
 
 
-def _end_of(file: IO[bytes]) -> bytes:
+def end_of(file: IO[bytes], kept: int = KEPT_OUTPUT_BYTES) -> bytes:
+    """Return the last bytes of a file, at most so many."""
     size = file.seek(0, os.SEEK_END)
-    file.seek(max(0, size - KEPT_OUTPUT_BYTES))
+    file.seek(max(0, size - kept))
     return file.read()
 
 

@@ -34,9 +34,6 @@ class Watcher:
     def begins(self, processes: int) -> None:
         """The run starts; `processes` processes will be started."""
 
-    def timing_starts(self) -> None:
-        """All checks have ended; the following processes are timed."""
-
     def adds_rounds(self, task: Task, rounds: int) -> None:
         """A cell is not precise yet; `rounds` more rounds follow."""
 
@@ -55,8 +52,5 @@ class Watcher:
     def machines(self, names: Sequence[str]) -> None:
         """These machines of a cluster take part now, one name per worker."""
 
-    def says(self, message: str) -> None:
-        """Before the first round: what precision this machine and the budget allow."""
-
     def shows(self, message: str) -> None:
-        """Something happened to a machine of the cluster, or to a unit that it measured."""
+        """A remark: what precision can be expected, or what happened to a machine of a cluster."""

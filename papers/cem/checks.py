@@ -18,6 +18,8 @@ from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.results.papers import Row
 
+from .boundary_operator import BoundaryOperator
+
 if TYPE_CHECKING:
     import pandas as pd
 
@@ -127,10 +129,7 @@ def distortion_near_pole_and_boundary(
 
 def iteration_matrix(mesh: TriangleMesh, L: sparse.sparray | None = None) -> NDArray[np.float64]:
     """Return K (Eq. 27), dense (B, B), for a Laplacian on the edges; default: of cotangents."""
-    dense = (cotangent_laplacian(mesh.V, mesh.F) if L is None else L).toarray()
-    i, b = mesh.interior, mesh.loops[0]
-    inner = np.linalg.solve(dense[np.ix_(i, i)], dense[np.ix_(i, b)])
-    return np.linalg.solve(dense[np.ix_(b, b)], dense[np.ix_(i, b)].T @ inner)
+    return BoundaryOperator(mesh, L).dense
 
 
 def spectrum(K: NDArray[np.float64]) -> tuple[float, float, float]:

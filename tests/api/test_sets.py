@@ -10,7 +10,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.holed_disk import holed_disk
 
 from cembench import ParameterError
-from cembench.api.sets import CORPUS_VARIABLE, EXHIBIT, SETS, gathered, surfaces_of_set
+from cembench.api.sets import CORPUS_VARIABLE, EXHIBIT, GROUPS, gathered, surfaces_of_set
 from cembench.api.surface_collections import MANIFEST, read_manifest
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -120,7 +120,7 @@ def test_an_unknown_set_names_those_there_are():
 
 def test_every_group_that_a_set_names_is_in_the_catalogue():
     groups = load_registry().groups
-    assert {group for one in SETS.values() for group in one.groups} <= set(groups)
+    assert {group for groups in GROUPS.values() for group in groups} <= set(groups)
 
 
 def test_files_that_cannot_be_fetched_are_given_with_the_reason(monkeypatch, tmp_path):

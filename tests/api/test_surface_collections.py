@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.holed_disk import holed_disk
+from cembench.surfaces.sets import surfaces_of_thingi10k
 
 from cembench.api import surface_collections
 from cembench.api.parameterize import parameterize
 from cembench.api.surface_collections import (
     surfaces_of_archive,
     surfaces_of_folder,
-    surfaces_of_thingi10k,
 )
 from cembench.core.errors import ParameterError
 from cembench.mesh.files import write_mesh

@@ -106,7 +106,7 @@ def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
     told = " ".join(out.split())
     assert "mine †" in told
     assert "† external program: its seconds are the wall clock of a process" in told
-    assert "solve 0.125 s (by its own word)" in told
+    assert "solve 0.125 s (printed by the program)" in told
     code, out, _ = cli(*words, "--json")
     ours, row = json.loads(out)
     assert (ours["external"], ours["start_seconds"], ours["solve_seconds"]) == (None, None, None)

@@ -1,11 +1,18 @@
 import numpy as np
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.holed_disk import holed_disk
 from cembench.surfaces.spherical_cap import spherical_cap
 from scipy import special
 
 from cembench import DiskMesh, ParameterError
-from cembench.conformal.resample import geometry_image, locate, regular_remesh, square_to_disk
+from cembench.conformal.resample import (
+    geometry_image,
+    interpolated,
+    locate,
+    regular_remesh,
+    square_to_disk,
+)
 from cembench.mesh.triangle_mesh import definition_1_notices
 from cembench.mesh.unit_square import to_unit_square
 from cembench.registry import load_registry
@@ -127,3 +134,26 @@ def test_a_remeshed_surface_meets_definition_1():
     again, image = regular_remesh(mesh, z, 24)
     assert definition_1_notices(again.F, again.n, again.loops) == ()
     assert len(image) == again.n
+
+
+def test_vertices_are_found_where_they_are_and_linear_values_are_interpolated_exactly():
+    mesh = flat_disk(600)
+    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    face, weights = locate(z, mesh.F, z)
+    np.testing.assert_allclose(interpolated(weights, mesh.V[mesh.F[face]]), mesh.V, atol=1e-9)
+    points = 0.98 * np.sqrt(np.linspace(0, 1, 500)) * np.exp(40j * np.linspace(0, 1, 500))
+    face, weights = locate(z, mesh.F, points)
+    assert (weights >= 0).all()
+    values = (3 * z.real - z.imag)[mesh.F[face]]
+    found = interpolated(weights, values)
+    np.testing.assert_allclose(found, 3 * points.real - points.imag, atol=1e-12)
+
+
+def test_points_beyond_a_boundary_edge_come_to_its_chord():
+    mesh = flat_disk(600)
+    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    ends = z[mesh.boundary], np.roll(z[mesh.boundary], -1)
+    middle = (ends[0] + ends[1]) / 2
+    face, weights = locate(z, mesh.F, middle / np.abs(middle), nearest=True)
+    np.testing.assert_allclose(interpolated(weights, z[mesh.F[face]]), middle, atol=1e-9)
+    assert (locate(z, mesh.F, middle / np.abs(middle))[0] == -1).all()

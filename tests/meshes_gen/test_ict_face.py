@@ -138,7 +138,7 @@ def test_landmarks_of_another_surface_are_refused():
 
 def test_without_its_files_the_error_says_how_to_fetch(monkeypatch, tmp_path):
     monkeypatch.setenv("CEMBENCH_ICT_FACE", str(tmp_path / "nowhere"))
-    with pytest.raises(DatasetError, match=r"cembench fetch --group ict-face.*CEMBENCH_ICT_FACE"):
+    with pytest.raises(DatasetError, match=r"cembench.fetch.*ict-face.*CEMBENCH_ICT_FACE"):
         cembench.surface("ict-face")
 
 

@@ -76,7 +76,7 @@ class Listening(Watcher):
     def __init__(self):
         self.said = []
 
-    def says(self, words):
+    def shows(self, words):
         self.said.append(words)
 
 

@@ -128,9 +128,7 @@ def published(bundles, tmp_path_factory):
     folder = tmp_path_factory.mktemp("site") / "site"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(site, "build_report", lambda e, f, command: Report(command, command, (), ()))
-        from cembench.api.submissions import accepted, bundles_in
-
-        with accepted(bundles_in(bundles)) as runs:
+        with bundle.accepted(bundle.bundles_in(bundles)) as runs:
             site.publish(runs, folder)
             entrants = [site.Entrant(run.name, site.Evidence.of(run)) for run in runs]
             return folder, leaderboard(entrants, "cembench publish")

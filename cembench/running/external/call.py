@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,7 @@ from cembench.running.external.exchange import (
     write_input,
 )
 from cembench.running.external.installed import missing
+from cembench.running.process import end_of, signal_name
 from cembench.running.sanitized_result import Returned
 
 #: Phase name for the wall clock of a program.
@@ -262,17 +264,13 @@ def _ended(command: Sequence[str], folder: Path, largest_file: int, *, watched: 
             peak = _watched(process) if watched else None
             code = process.wait()
             seconds = perf_counter() - started
-        return Ended(code, seconds, _end_of(log), peak)
+        printed = b""
+        with suppress(OSError), log.open("rb") as written:  # the program may have removed it
+            printed = end_of(written, SEARCHED)
+        return Ended(code, seconds, printed.decode(errors="replace"), peak)
     finally:
         with suppress(OSError):
             log.unlink()
-
-
-def _end_of(log: Path) -> str:
-    with suppress(OSError), log.open("rb") as file:
-        file.seek(max(0, log.stat().st_size - SEARCHED))
-        return file.read().decode(errors="replace")
-    return ""
 
 
 @contextmanager
@@ -307,8 +305,6 @@ def _watched(process: subprocess.Popen[bytes]) -> int | None:
 
 def _fault(ended: Ended) -> ProgramFault:
     """Return the fault of a process that did not end with code 0."""
-    import signal
-
     said = ended.printed[-KEPT:].strip()
     last = f": {shortened(said.splitlines()[-1], 500)}" if said else ""
     if ended.code > 0:
@@ -318,6 +314,5 @@ def _fault(ended: Ended) -> ProgramFault:
     if sys.platform != "win32" and number == signal.SIGXFSZ:
         message = "the program was ended because a file that it wrote grew too large"
         return ProgramFault(FaultKind.OUTPUT_TOO_LARGE, message, said=said)
-    known = {int(one): one.name for one in signal.Signals}
-    message = f"the program was ended by signal {known.get(number, number)}{last}"
+    message = f"the program was ended by signal {signal_name(number)}{last}"
     return ProgramFault(FaultKind.PROGRAM_ENDED, message, said=said)

@@ -63,7 +63,7 @@ def test_the_c_example_is_valid_as_the_guide_says(typed):
     typed(compile_)
     printed = typed(map_)
     assert "lscm_in_c (external program) (free boundary)" in printed
-    assert "(by its own word)" in " ".join(printed.split())
+    assert "(printed by the program)" in " ".join(printed.split())
     printed = typed(validate)
     assert not re.search(r" fault  ", printed)
     documented = GUIDE.split("exit code is 0:\n\n```\n")[1].split("\n```")[0]

@@ -2,9 +2,9 @@ import json
 
 import numpy as np
 import pytest
+from cembench.papers.cem.holes_exhibits import examine_holes
 from cembench.surfaces.holed_disk import holed_disk
 
-from cembench.api.holes_exhibits import examine_holes
 from cembench.registry import load_registry
 from cembench.results.exhibits import read_exhibits
 from tests import gallery
@@ -85,8 +85,8 @@ def test_it_tells_its_steps_while_it_works(tmp_path):
     algorithms = [load_registry().algorithm("koebe-cem")]
     heard = []
     run = (tmp_path / "run", "cembench holes", pytest.fail, heard.append)
-    rows, maps = examine_holes(mesh, algorithms, None, 2, *run)
-    assert list(maps) == ["koebe-cem"]
+    found = examine_holes(mesh, algorithms, None, 2, *run)
+    assert list(found) == ["koebe-cem"]
     steps = [words for words in heard if "is a circle" in words]
     assert len(steps) == len(set(steps)) == 2 * len(mesh.loops)
-    assert len(heard) == len(steps) + 1 + len(rows) + 1
+    assert len(heard) == len(steps) + 1 + len(found.rows) + 1

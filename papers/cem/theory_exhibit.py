@@ -12,18 +12,17 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from cembench.api.boundary_operator import Trajectory
-from cembench.api.theory_facts import LOOKS, TheoryFacts
 from cembench.core.atomic import write
-from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.results.exhibits import (
     Exhibit,
     ExhibitPicture,
     ExhibitTable,
-    exhibit_folder,
     place_of,
     write_exhibit,
 )
+
+from .boundary_operator import Trajectory
+from .theory_facts import LOOKS, TheoryFacts
 
 #: Colours, which also differ in lightness: for (23) and (30), and for other algorithms.
 COLOURS = ("#1f5f99", "#c8553d")
@@ -36,9 +35,9 @@ LEAST = 1e-12
 PICTURE = "theory.png"
 
 
-def claim_exhibit(run: Path, mesh: DiskMesh) -> Path:
-    """Return the folder of a surface's exhibit in a run; raise if it cannot be written to."""
-    return exhibit_folder(run, f"theory-{mesh.name}")
+def exhibit_name(surface: str) -> str:
+    """Return the name of a surface's exhibit."""
+    return f"theory-{surface}"
 
 
 def add_exhibit(run: Path, found: TheoryFacts, command: str) -> None:
@@ -48,13 +47,13 @@ def add_exhibit(run: Path, found: TheoryFacts, command: str) -> None:
     write_exhibit(run, exhibit)
 
 
-def theory_exhibit(found: TheoryFacts, command: str = "") -> Exhibit:
+def theory_exhibit(found: TheoryFacts, command: str) -> Exhibit:
     """Return what was found as an exhibit: a summary, tables, and the name of a picture."""
     facts = dict(found.facts)
     return Exhibit(
-        name=f"theory-{facts['mesh']}",
+        name=exhibit_name(facts["mesh"]),
         title=f"Section 4 on {facts['mesh']}",
-        text=_summary(facts) + (f" {found.missing}" if found.missing else ""),
+        text=f"{_size(facts)}. {_summary(facts)}" + (f" {found.missing}" if found.missing else ""),
         command=command,
         origin="surface",
         pictures=(
@@ -67,6 +66,10 @@ def theory_exhibit(found: TheoryFacts, command: str = "") -> Exhibit:
         tables=tuple(_tables(facts)),
         facts=facts,
     )
+
+
+def _size(facts: Mapping[str, Any]) -> str:
+    return f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
 
 
 def _summary(facts: dict[str, Any]) -> str:
@@ -127,8 +130,7 @@ def _write_plots(path: Path, found: TheoryFacts) -> None:
     facts = found.facts
     figure = Figure(figsize=(13, 4.2), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
-    vertices = f"{facts['vertices']:,} vertices, {facts['boundary_vertices']} on the boundary"
-    figure.suptitle(f"{facts['mesh']}: {vertices}", fontweight="bold")
+    figure.suptitle(f"{facts['mesh']}: {_size(facts)}", fontweight="bold")
     spectrum, energy, steps = figure.subplots(1, 3)
     _draw_spectrum(spectrum, np.asarray(found.spectrum))
     _draw_energies(energy, found.trajectories, found.others)

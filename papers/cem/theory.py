@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cembench.api.settings import AnyPath, Faces
 from cembench.core.arguments import Range, checked
 from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
-    from cembench.api.theory_facts import TheoryFacts
+    from cembench.mesh.triangle_mesh import DiskMesh
+    from cembench.results.exhibits import Exhibit
     from cembench.running.surfaces import SurfaceInput
+
+    from .theory_facts import TheoryFacts
+
+__all__ = ["theory"]
 
 
 @checked
@@ -64,24 +69,54 @@ def theory(
     True
 
     """
-    from cembench.api.theory_exhibit import add_exhibit, claim_exhibit
-    from cembench.api.theory_facts import RIVAL, theory_facts
-    from cembench.mesh.triangle_mesh import DiskMesh
     from cembench.registry import load_registry
-    from cembench.results import run_folder
-    from cembench.running.surfaces import load_surface
+    from cembench.results import exhibits, run_folder
+
+    from .theory_exhibit import add_exhibit, exhibit_name
+    from .theory_facts import RIVAL, theory_facts
 
     if run is not None:
         run_folder.check(Path(run))
-    registry = load_registry()
-    mesh = load_surface(surface, (DiskMesh,), faces=faces, registry=registry)
+    mesh = loaded(surface, faces=faces)
     with reporter.busy(f"Section 4 on {mesh.name}"):
+        if run is not None:  # fail now, not after the computation
+            exhibits.exhibit_folder(Path(run), exhibit_name(mesh.name))
+        found = theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
         if run is not None:
-            claim_exhibit(Path(run), mesh)  # fail now, not after the computation
-        found = theory_facts(mesh, registry.algorithms.get(RIVAL), iterations)
-        if run is not None:
-            name = Path(surface).name if isinstance(surface, str | os.PathLike) else mesh.name
-            size = "" if faces is None else f" --faces {faces}"
-            command = f"cembench theory {name} --iterations {iterations}{size}"
+            command = exhibits.command(
+                "theory", surface, mesh.name, iterations=iterations, faces=faces
+            )
             add_exhibit(Path(run), found, command)
     return found
+
+
+# For the command line
+
+
+def loaded(surface: SurfaceInput, *, faces: int | None, **_: Any) -> DiskMesh:
+    """Return the disk that was named."""
+    from cembench.mesh.triangle_mesh import DiskMesh
+    from cembench.running.surfaces import load_surface
+
+    return load_surface(surface, (DiskMesh,), faces=faces)
+
+
+def shown(found: Sequence[TheoryFacts], command: str) -> list[Exhibit]:
+    """Return the exhibits of surfaces, which `command` makes."""
+    from .theory_exhibit import theory_exhibit
+
+    return [theory_exhibit(one, command) for one in found]
+
+
+def facts(found: Sequence[TheoryFacts]) -> list[Any]:
+    """Return the results as plain data."""
+    return [one.facts for one in found]
+
+
+def failures(found: Sequence[TheoryFacts]) -> list[str]:
+    """Return the surfaces where a statement fails although all premises hold."""
+    return [
+        f"{one.facts['mesh']}: a statement fails although all premises hold"
+        for one in found
+        if one.facts["premises_hold"] and not one.facts["statements_hold"]
+    ]

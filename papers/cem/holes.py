@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -14,7 +13,14 @@ from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
     from cembench.api.parameterize import Result
+    from cembench.mesh.triangle_mesh import HoledMesh
+    from cembench.results.exhibits import Exhibit
     from cembench.running.surfaces import SurfaceInput
+
+__all__ = ["HoledMaps", "holes"]
+
+#: The surface that is mapped where none is named; it stands in for a model without a public mesh.
+STAND_IN = "ho-face-with-holes"
 
 
 class HoledMaps(dict[str, "Result"]):
@@ -45,15 +51,15 @@ class HoledMaps(dict[str, "Result"]):
         self.rows = list(rows)
 
     def __missing__(self, name: str) -> Result:
-        for row in self.rows:
-            if row["algorithm"] == name:
-                raise AlgorithmFailed(f"{row['mesh']} / {name}: {row['status']}: {row['cause']}")
+        own = [row for row in self.rows if row["algorithm"] == name]
+        for message in failures([HoledMaps({}, own)]):
+            raise AlgorithmFailed(message)
         raise KeyError(name)
 
 
 @checked
 def holes(
-    surface: SurfaceInput,
+    surface: SurfaceInput = STAND_IN,
     *,
     outer: Annotated[int, Range(0, 2**63 - 1)] | None = None,
     sweeps: Annotated[int, Range(1, 1000)] = 8,
@@ -69,7 +75,7 @@ def holes(
     Parameters
     ----------
     surface : mesh, path, name or pair of arrays (V, F)
-        A surface of genus 0 with two boundary loops or more.
+        A surface of genus 0 with two boundary loops or more (default: a face made for this).
     outer : int, optional
         A vertex of the outer boundary, counted from 0 (default: the widest boundary).
     sweeps : int
@@ -102,33 +108,56 @@ def holes(
     ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
 
     """
-    from cembench.api.holes_exhibits import examine_holes, write_holes_table
-    from cembench.mesh.triangle_mesh import HoledMesh
     from cembench.registry import load_registry
-    from cembench.results import run_folder
-    from cembench.running.surfaces import load_surface
+    from cembench.results import exhibits, run_folder
+
+    from .holes_exhibits import examine_holes
 
     folder = None if run is None else Path(run)
     if folder is not None:
         run_folder.check(folder)
-    registry = load_registry()
-    mesh = load_surface(surface, (HoledMesh,), faces=faces, registry=registry)
-    mesh.outer_and_holes(outer)
+    mesh = loaded(surface, faces=faces, outer=outer)
     algorithms = [
-        a for a in registry.algorithms.values() if a.target == "circular holes" and a.usual
+        a for a in load_registry().algorithms.values() if a.target == "circular holes" and a.usual
     ]
-    name = Path(surface).name if isinstance(surface, str | os.PathLike) else mesh.name
-    command = holes_command([name], outer=outer, sweeps=sweeps, faces=faces)
+    command = exhibits.command("holes", surface, mesh.name, outer=outer, sweeps=sweeps, faces=faces)
     with reporter.busy(f"Koebe's method on {mesh.name}") as tell:
-        rows, maps = examine_holes(
-            mesh, algorithms, outer, sweeps, folder, command, reporter.warn, tell
-        )
+        found = examine_holes(mesh, algorithms, outer, sweeps, folder, command, reporter.warn, tell)
     if folder is not None:
-        write_holes_table(rows, folder, command)
-    return HoledMaps(maps, rows)
+        for exhibit in shown([found], command):
+            exhibits.write_exhibit(folder, exhibit)
+    return found
 
 
-def holes_command(names: Sequence[str], **options: int | None) -> str:
-    """Return the command that makes the exhibits of surfaces with holes again."""
-    words = (f" --{name} {value}" for name, value in options.items() if value is not None)
-    return f"cembench holes {' '.join(names)}{''.join(words)}"
+# For the command line
+
+
+def loaded(surface: SurfaceInput, *, faces: int | None, outer: int | None, **_: Any) -> HoledMesh:
+    """Return the surface with holes that was named, which has this outer boundary."""
+    from cembench.mesh.triangle_mesh import HoledMesh
+    from cembench.running.surfaces import load_surface
+
+    mesh = load_surface(surface, (HoledMesh,), faces=faces)
+    mesh.outer_and_holes(outer)
+    return mesh
+
+
+def shown(found: Sequence[HoledMaps], command: str) -> list[Exhibit]:
+    """Return a table of the figures of all surfaces as an exhibit, which `command` makes."""
+    from .holes_exhibits import holes_table
+
+    return [holes_table(facts(found), command)]
+
+
+def facts(found: Sequence[HoledMaps]) -> list[Any]:
+    """Return the figures of all maps as plain data."""
+    return [row for one in found for row in one.rows]
+
+
+def failures(found: Sequence[HoledMaps]) -> list[str]:
+    """Return which maps are not valid, and why."""
+    return [
+        f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}"
+        for row in facts(found)
+        if row["status"] != "ok"
+    ]

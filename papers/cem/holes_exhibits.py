@@ -10,7 +10,6 @@ from cembench.api.parameterize import Result
 from cembench.conformal.metrics import circle_of, dirichlet_energy, image_area
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import MapStep
-from cembench.drawing.koebe_steps import StepPanel, write_steps
 from cembench.drawing.preview import write_preview
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import Algorithm
@@ -27,8 +26,9 @@ from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 
-#: A stand-in for a model of which no mesh is public.
-STAND_IN = "ho-face-with-holes"
+from .holes import STAND_IN, HoledMaps
+from .koebe_steps import StepPanel, write_steps
+
 #: Maximum number of steps in a picture; further steps are left out.
 MOST_STEPS = 4
 
@@ -42,7 +42,7 @@ def examine_holes(
     command: str,
     warn: Callable[[str], object],
     tell: Callable[[str], object] = lambda _: None,
-) -> tuple[list[dict[str, Any]], dict[str, Result]]:
+) -> HoledMaps:
     """Map a surface by every algorithm; return a row for each, and the first valid map of each.
 
     Two exhibits are written if there is a `run`. `outer` is a vertex of the outer boundary,
@@ -74,7 +74,7 @@ def examine_holes(
             if uv is not None and count == 1 and run is not None:
                 tell(f"{algorithm.title} on {mesh.name}: drawing")
                 _write_figure_exhibits(mesh, steps, uv, record, outer, run, command)
-    return rows, maps
+    return HoledMaps(maps, rows)
 
 
 def _next_step(mesh: HoledMesh, algorithm: Algorithm, step: MapStep, sweeps: int) -> str:
@@ -128,71 +128,59 @@ def _write_figure_exhibits(
     run: Path,
     command: str,
 ) -> None:
-    """Write the exhibits of the steps of the first sweep, and of the map."""
-    metrics = record.outcome.metrics
+    """Write the exhibits of the map, and of the steps of the first sweep."""
     origin: MeshOrigin = "stand-in" if mesh.name == STAND_IN else "surface"
-    figures = {
-        "angle_error_mean_deg": metrics["angle_error_mean_deg"],
-        "conformal_energy": metrics["conformal_energy"],
-        "boundary_circularity": metrics["boundary_circularity"],
-        "flipped_triangles": metrics["flipped_triangles"],
-    }
-    caption = (
-        f"E_C {metrics['conformal_energy']:.4f}   "
-        f"mean angle error {metrics['angle_error_mean_deg']:.2f} degrees   "
-        f"circularity error {metrics['boundary_circularity']:.1g}   "
-        f"{metrics['flipped_triangles']} folds"
-    )
-    name = f"koebe-map-{mesh.name}"
-    picture = exhibit_folder(run, name) / "map.png"
-    write_preview(mesh, uv, picture, title=f"{mesh.name}: {record.title}", caption=caption)
     alternative = "A checkerboard on the surface and on its image, a disk with circular holes."
-    write_exhibit(
-        run,
-        Exhibit(
-            name=name,
-            title=f"{mesh.name} and its image, a disk with circular holes",
-            text=f"The result of one sweep of Koebe's method. {caption}.",
-            command=command,
-            origin=origin,
-            figure=usual_paper().exhibited("koebe-map"),
-            pictures=(ExhibitPicture(file="map.png", caption=caption, alternative=alternative),),
-            facts=figures,
-        ),
+
+    def exhibit(kind: str, file: str, caption: str, **more: Any) -> None:
+        picture = ExhibitPicture(file=file, caption=caption, alternative=alternative)
+        figure = usual_paper().exhibited(kind)
+        shared: dict[str, Any] = {"command": command, "origin": origin, "figure": figure}
+        name = f"{kind}-{mesh.name}"
+        write_exhibit(run, Exhibit(name=name, pictures=(picture,), **shared, **more))
+
+    figures = {name: record.outcome.metrics[name] for name in _FIGURES}
+    caption = (
+        f"E_C {figures['conformal_energy']:.4f}   "
+        f"mean angle error {figures['angle_error_mean_deg']:.2f} degrees   "
+        f"circularity error {figures['boundary_circularity']:.1g}   "
+        f"{figures['flipped_triangles']} folds"
+    )
+    picture = exhibit_folder(run, f"koebe-map-{mesh.name}") / "map.png"
+    write_preview(mesh, uv, picture, title=f"{mesh.name}: {record.title}", caption=caption)
+    exhibit(
+        "koebe-map",
+        picture.name,
+        caption,
+        title=f"{mesh.name} and its image, a disk with circular holes",
+        text=f"The result of one sweep of Koebe's method. {caption}.",
+        facts=figures,
     )
     if len(mesh.loops) > MOST_STEPS:
         return
-    name = f"koebe-steps-{mesh.name}"
     first = [step for step in steps if step.sweep == 1]
+    outer_loop, others = mesh.outer_and_holes(outer)
+    loops = (outer_loop, *others)
+    picture = exhibit_folder(run, f"koebe-steps-{mesh.name}") / "steps.png"
     title = f"{mesh.name}: the steps of Koebe's method"
-    panels = _panels(mesh, first, outer)
-    write_steps(mesh, panels, uv, exhibit_folder(run, name) / "steps.png", title)
+    write_steps(mesh, _panels(loops, first), uv, picture, title)
     words = (
         "(a) The surface. Then, in turn: one boundary (red) is left open and the others are filled,"
         " CEM makes the open one a circle; the next boundary is turned outside by an inversion at "
         "its centroid. The checkerboard is that of the final map throughout."
     )
-    table = _steps_table(mesh, first, outer)
-    write_exhibit(
-        run,
-        Exhibit(
-            name=name,
-            title=f"The steps of Koebe's method on {mesh.name}",
-            text=words,
-            command=command,
-            origin=origin,
-            figure=usual_paper().exhibited("koebe-steps"),
-            pictures=(ExhibitPicture(file="steps.png", caption=words, alternative=alternative),),
-            tables=(table,),
-            facts={"iterations": [len(step.energies) - 1 for step in first]},
-        ),
+    exhibit(
+        "koebe-steps",
+        picture.name,
+        words,
+        title=f"The steps of Koebe's method on {mesh.name}",
+        text=words,
+        tables=(_steps_table(loops, first),),
+        facts={"iterations": [len(step.energies) - 1 for step in first]},
     )
 
 
-def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
-
-    first, others = mesh.outer_and_holes(outer)
-    loops = (first, *others)
+def _panels(loops: Sequence[Any], steps: list[MapStep]) -> list[StepPanel]:
     panels = [StepPanel("the surface")]
     for step in steps:
         name = "outer boundary" if step.boundary == 0 else f"hole {step.boundary}"
@@ -202,12 +190,10 @@ def _panels(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Any:
     return panels
 
 
-def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> ExhibitTable:
+def _steps_table(loops: Sequence[Any], steps: list[MapStep]) -> ExhibitTable:
     """Return the circularity of each boundary after each step of the sweep."""
-    first, others = mesh.outer_and_holes(outer)
-    loops = (first, *others)
     names = ("outer", *(f"hole {k}" for k in range(1, len(loops))))
-    rows: tuple[tuple[str | float | int | None, ...], ...] = tuple(
+    rows: tuple[tuple[str | float | None, ...], ...] = tuple(
         (
             names[step.boundary],
             len(step.energies) - 1,
@@ -221,6 +207,13 @@ def _steps_table(mesh: HoledMesh, steps: list[MapStep], outer: int | None) -> Ex
     )
 
 
+#: The figures of a map in its exhibit.
+_FIGURES = (
+    "angle_error_mean_deg",
+    "conformal_energy",
+    "boundary_circularity",
+    "flipped_triangles",
+)
 #: The columns of the table: the heading of each key in the rows, and the format of its numbers.
 _TABLE = {
     "mesh": ("surface", ""),
@@ -239,8 +232,8 @@ _TABLE = {
 }
 
 
-def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -> Exhibit:
-    """Add a table of the figures of all surfaces to a run; return its exhibit."""
+def holes_table(rows: Sequence[dict[str, Any]], command: str) -> Exhibit:
+    """Return a table of the figures of all surfaces as an exhibit, which `command` makes."""
     table = ExhibitTable.of(
         "Surfaces with holes",
         _TABLE,
@@ -253,7 +246,7 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         ),
     )
     standing = {row["mesh"] for row in rows} <= {STAND_IN}
-    exhibit = Exhibit(
+    return Exhibit(
         name="holes",
         title="Surfaces with holes",
         text="Koebe's method after one sweep and after the best number of sweeps, and the "
@@ -263,5 +256,3 @@ def write_holes_table(rows: Sequence[dict[str, Any]], run: Path, command: str) -
         tables=(table,),
         facts={"rows": rows},
     )
-    write_exhibit(run, exhibit)
-    return exhibit

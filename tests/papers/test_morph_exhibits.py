@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from cembench.papers.cem.morph import write_exhibits
 from PIL import Image
 
-from cembench.morphing.exhibit import write_morph_exhibits
 from cembench.morphing.morph import morph
 from cembench.results.exhibits import read_exhibits
 from cembench.results.papers import find_paper
@@ -21,9 +21,7 @@ def run(found, tmp_path):
     """What is laid down for a morph, drawn small."""
 
     def lay(rows):
-        write_morph_exhibits(
-            tmp_path, found, found.metrics(24), "cembench morph", rows, sides=(48, 64)
-        )
+        write_exhibits(tmp_path, found, found.metrics(24), "cembench morph", rows, sides=(48, 64))
         return tmp_path, read_exhibits(tmp_path)
 
     return lay

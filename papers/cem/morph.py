@@ -1,9 +1,10 @@
-"""Pictures of a morph: a strip of frames, and the registrations under a checkerboard."""
+"""Exhibits of a morph: a strip of frames, and the registrations under a checkerboard."""
 
 from __future__ import annotations
 
 import io
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from cembench.core.atomic import write_bytes
 from cembench.drawing.preview import draw_panels
 from cembench.drawing.scene import FILL
-from cembench.morphing.drawing import Film, draw_film
+from cembench.morphing.drawing import draw_film
+from cembench.morphing.metrics import tables_of
 from cembench.morphing.morph import Morph
+from cembench.results.exhibits import (
+    Exhibit,
+    ExhibitPicture,
+    exhibit_folder,
+    write_exhibit,
+)
+from cembench.results.papers import usual_paper
+from cembench.results.records import MeshOrigin
 
 Complex = NDArray[np.complex128]
 Picture = NDArray[np.uint8]
@@ -26,11 +37,77 @@ INK, TARGET, PLACE = "#22384d", "#ffffff", "#d11c21"
 FRAMES, STRIP_VIEWS = 7, ("front", "three-quarter")
 
 
+def write_exhibits(
+    run: Path,
+    morph: Morph,
+    figures: dict[str, Any],
+    command: str,
+    rows_of_paper: tuple[str, ...],
+    tell: Callable[[str], object] = lambda step: None,
+    sides: tuple[int, int] = (240, 420),
+) -> list[Path]:
+    """Write both exhibits to a run's folder; return the paths of their descriptions.
+
+    `figures` are the morph's metrics; `rows_of_paper` are the paper's models that the surfaces
+    stand in for, "" for none; `sides` are the pixels of a picture on each page.
+    """
+    paper = usual_paper()
+    origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
+    names = [mesh.name for mesh in morph.meshes]
+    stem = "-".join(names)
+    registrations, path = tables_of(figures)
+    shared: dict[str, Any] = {"command": command, "origin": origin, "facts": figures}
+    tell("drawing the strip")
+    strip = _picture(
+        run,
+        f"morph-{stem}",
+        "strip.png",
+        strip_page(morph, sides[0]),
+        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and the side.",
+    )
+    board = _picture(
+        run,
+        f"registration-{stem}",
+        "maps.png",
+        registration_page(morph, sides[1], tell),
+        "Conformal maps, and below them the Moebius map and the registrations: now equal squares "
+        "lie on the same features. Dots are landmarks, rings their targets.",
+    )
+    spline = "a cubic spline" if len(names) > 2 else "a straight line"
+    done = [
+        Exhibit(
+            name=f"morph-{stem}",
+            title="Morph: " + ", ".join(names),
+            text=f"The vertices of {names[0]} are carried onto the other surfaces, and {spline} in "
+            "time leads through their places.",
+            figure=paper.exhibited("morph", rows_of_paper),
+            pictures=(strip,),
+            tables=(path,),
+            **shared,
+        ),
+        Exhibit(
+            name=f"registration-{stem}",
+            title="Registration: " + ", ".join(names),
+            text="Conformal maps f of the surfaces to the disk; a Moebius map m1 that takes the "
+            "first landmark to the centre; registration maps r that minimise (34).",
+            figure=paper.exhibited("registration", rows_of_paper),
+            pictures=(board,),
+            tables=(registrations,),
+            **shared,
+        ),
+    ]
+    return [write_exhibit(run, exhibit) for exhibit in done]
+
+
+def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> ExhibitPicture:
+    write_bytes(exhibit_folder(run, name) / file, content)
+    return ExhibitPicture(file=file, caption=caption, alternative=caption)
+
+
 def strip_page(morph: Morph, side: int = 240) -> bytes:
     """Return a PNG of the path at seven moments, one column each, in two views."""
     times = np.linspace(0, 1, FRAMES)
-    film = Film.of(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
-    pictures = draw_film(film)
+    pictures = draw_film(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
     rows = [
         [picture[:, row * side : (row + 1) * side] for picture in pictures]
         for row in range(len(STRIP_VIEWS))

@@ -8,7 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from cembench.api.boundary_operator import (
+from cembench.conformal.certificate import certify
+from cembench.core.errors import AlgorithmFailed
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import Algorithm
+
+from .boundary_operator import (
     TOLERANCE,
     BoundaryOperator,
     Check,
@@ -18,10 +23,6 @@ from cembench.api.boundary_operator import (
     statements,
     trajectory,
 )
-from cembench.conformal.certificate import certify
-from cembench.core.errors import AlgorithmFailed
-from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import Algorithm
 
 #: The algorithm whose energies are compared with CEM's, if installed.
 RIVAL = "direct-cem"

@@ -4,11 +4,8 @@ import json
 
 import numpy as np
 import pytest
-from cembench.surfaces.flat_disk import flat_disk
-
-from cembench import DiskMesh, Parameterization, algorithm
-from cembench.api import theory_facts
-from cembench.api.boundary_operator import (
+from cembench.papers.cem import theory_facts
+from cembench.papers.cem.boundary_operator import (
     TOLERANCE,
     BoundaryOperator,
     predicted_rate,
@@ -16,7 +13,10 @@ from cembench.api.boundary_operator import (
     statements,
     trajectory,
 )
-from cembench.api.theory_facts import _rival_history
+from cembench.papers.cem.theory_facts import _rival_history
+from cembench.surfaces.flat_disk import flat_disk
+
+from cembench import DiskMesh, Parameterization, algorithm
 from cembench.core.errors import AlgorithmFailed
 from cembench.results.exhibits import read_exhibits
 from tests import gallery
@@ -174,7 +174,7 @@ def test_the_certificate_is_told_in_json_and_in_eighty_columns(cli):
     table = out[out.index("four boundary points") :]
     assert f"{found['lower']:.5f}" in table
     assert f"{found['off']['CEM, start']:+.1e}" in table
-    told = [line for line in out.splitlines() if not line.startswith("picture")]
+    told = [line for line in out.splitlines() if not line.startswith("Exhibits")]
     assert max(map(len, told)) <= 80
 
 

@@ -22,10 +22,9 @@ from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import inverted, on_circle, pole_start
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import backward_arcs
-from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.topology import boundary_half_edges, vertex_graph
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -106,52 +105,41 @@ class Trajectory:
         return float(np.median(ratios[-max(len(ratios) // 10, 1) :])) if len(ratios) else 0.0
 
 
-class BoundaryOperator:
-    """The operator K of a surface, applied without forming the matrix."""
+class BoundaryOperator(BorderedLaplacian):
+    """The operator K of a surface, applied without forming the matrix; default: of cotangents."""
 
-    def __init__(self, mesh: DiskMesh) -> None:
-        if not len(mesh.interior):
-            raise AlgorithmFailed("the mesh has no interior vertex, so K is zero")
+    def __init__(self, mesh: TriangleMesh, L: sparse.sparray | None = None) -> None:
         self.mesh = mesh
-        self.L = laplacian(mesh)
-        self._bordered = BorderedLaplacian(mesh, self.L, (mesh.boundary,))
-        self.L_bb, self.L_bi = self._bordered.L_bb, self._bordered.L_bi
-        self._ring = Cholesky(self.L_bb)
+        self.L = laplacian(mesh) if L is None else L
+        super().__init__(mesh, self.L, (mesh.loops[0],))
+        self._own_rows = Cholesky(self.L_bb)
 
     @property
     def size(self) -> int:
         """Number of boundary vertices."""
-        return len(self.mesh.boundary)
-
-    def extension(self, f_b: NDArray[Any]) -> NDArray[Any]:
-        """Return the harmonic interior values (Eq. 22)."""
-        return self._bordered.dirichlet(f_b)
+        return len(self.boundary)
 
     def ring(self, f_i: NDArray[Any]) -> NDArray[Any]:
         """Return the next boundary values (Eq. 23)."""
-        return self._ring.solve(-(self.L_bi @ f_i))
+        return self._own_rows.solve(-(self.L_bi @ f_i))
 
     def __call__(self, f_b: NDArray[Any]) -> NDArray[Any]:
         """Return K f_b."""
-        return self.ring(self.extension(f_b))
-
-    def energy(self, f_i: Complex, f_b: Complex) -> float:
-        """Return E_C (Eq. 7) of a map that is harmonic in the interior."""
-        return self._bordered.conformal_energy(f_i, f_b)
+        return self.ring(self.dirichlet(f_b))
 
     def leading_eigenpairs(self, count: int = LEADING) -> tuple[Real, Real]:
         """Return the largest eigenvalues of K, descending (k,), and eigenvectors (n_b, k)."""
         n = self.size
         count = min(count, n - 1)
 
-        def operator(apply: Callable[[Real], Real]) -> LinearOperator:
+        def operator(apply: Callable[[Any], Real]) -> LinearOperator:
             return LinearOperator((n, n), matvec=apply, dtype=np.float64)
 
         values, vectors = eigsh(
-            operator(lambda v: -(self.L_bi @ self.extension(v))),
+            operator(lambda v: -(self.L_bi @ self.dirichlet(v))),
             k=count,
             M=operator(lambda v: self.L_bb @ v),
-            Minv=operator(self._ring.solve),
+            Minv=operator(self._own_rows.solve),
             which="LA",
             v0=np.cos(np.arange(n)) + 1.0,
             ncv=min(n, max(4 * count, 40)),
@@ -160,15 +148,10 @@ class BoundaryOperator:
         order = np.argsort(values)[::-1]
         return values[order], vectors[:, order]
 
-    @property
-    def S(self) -> Real:
-        """The dense matrix L_bb - G."""
-        return self._bordered.S
-
     @cached_property
     def dense(self) -> Real:
         """The dense matrix K = I - L_bb^-1 S."""
-        return np.eye(self.size) - self._ring.solve(self.S)
+        return np.eye(self.size) - self._own_rows.solve(self.S)
 
     def spectrum(self) -> Real:
         """All eigenvalues in descending order, from a dense symmetric solver."""
@@ -178,21 +161,21 @@ class BoundaryOperator:
     def start(self) -> Complex:
         """CEM's initial boundary on the circle (Eqs. 13 to 18)."""
         mesh = self.mesh
-        return on_circle(pole_start(mesh.V, mesh.F, self._bordered.solved_boundary))
+        return on_circle(pole_start(mesh.V, mesh.F, self.solved_boundary))
 
 
 def trajectory(K: BoundaryOperator, iterations: int, *, inversion: bool) -> Trajectory:
     """Run the bare iteration (22), (23) or (30), (24), (25) from CEM's start."""
     f_b = K.start()
-    f_i = K.extension(f_b)
-    energies, steps = [K.energy(f_i, f_b)], []
+    f_i = K.dirichlet(f_b)
+    energies, steps = [K.conformal_energy(f_i, f_b)], []
     gap, off, backward = _largest_gap(f_b), 0.0, backward_arcs(f_b)
     for _ in range(iterations):
         after = on_circle(K.ring(inverted(f_i) if inversion else f_i))
         turn = np.vdot(f_b, after)
         steps.append(float(np.sqrt(np.mean(np.abs(after * np.conj(turn) / abs(turn) - f_b) ** 2))))
-        f_b, f_i = after, K.extension(after)
-        energies.append(K.energy(f_i, f_b))
+        f_b, f_i = after, K.dirichlet(after)
+        energies.append(K.conformal_energy(f_i, f_b))
         gap, backward = max(gap, _largest_gap(f_b)), max(backward, backward_arcs(f_b))
         off = max(off, float(np.abs(np.abs(f_b) - 1).max()))
     return Trajectory(np.array(energies), np.array(steps), gap, off, backward, f_b)
@@ -210,7 +193,7 @@ def premises(K: BoundaryOperator) -> list[Check]:
     """
     mesh = K.mesh
     graph = vertex_graph(mesh.F, mesh.n)
-    i, b = mesh.interior, mesh.boundary
+    i, b = K.interior, K.boundary
 
     def pieces(part: NDArray[np.int64]) -> int:
         return int(csgraph.connected_components(graph[part][:, part], directed=False)[0])
