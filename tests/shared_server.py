@@ -7,11 +7,12 @@ are not about processes. A server has loaded only the libraries, whoever it has 
 """
 
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
 from cembench.linear_algebra.backends import default_backend
-from cembench.running import launcher
+from cembench.running import launcher, plugins
 from cembench.running.environment import for_measuring
 from cembench.running.fork_server import ForkServer, can_fork
 from cembench.running.launcher import Launcher
@@ -27,7 +28,7 @@ class _Kept(ForkServer):
 
     key = None
     #: In the order in which they were given back.
-    idle: "list[_Kept]" = []
+    idle: ClassVar = []
 
     @classmethod
     def of(cls, environment, backend):
@@ -69,11 +70,11 @@ def kept_servers(_servers, monkeypatch):
 
     def write_absolute(self, job):
         """The server is not in the test's folder."""
-        plugins = tuple(
+        absolute = tuple(
             str(Path(plugin).absolute()) if plugin.endswith(".py") else plugin
             for plugin in job.plugins
         )
-        return write(self, job.model_copy(update={"plugins": plugins}))
+        return write(self, job.model_copy(update={"plugins": absolute}))
 
     monkeypatch.setattr(launcher, "ForkServer", _Kept.of)
     monkeypatch.setattr(Launcher, "_write", write_absolute)
@@ -81,10 +82,20 @@ def kept_servers(_servers, monkeypatch):
         _Kept.of(for_measuring(1), default_backend()).close()
 
 
+#: What plug-ins that could be imported hold.
+_TRIED = set()
+
+
 @pytest.fixture
 def one_server(kept_servers, monkeypatch):
-    """Fork also what is started as an interpreter of its own."""
-    started = Launcher._started
+    """Fork also what is started as an interpreter of its own; try each plug-in once."""
+    started, tried = Launcher._started, plugins._try
+
+    def try_once(plugin, seconds):
+        content = Path(plugin).read_bytes() if Path(plugin).is_file() else None
+        if content is None or content not in _TRIED:
+            tried(plugin, seconds)
+            _TRIED.add(content)
 
     def fork(self, job, limits, log):
         if not can_fork(job.cell.threads):
@@ -96,3 +107,4 @@ def one_server(kept_servers, monkeypatch):
             server.close()
 
     monkeypatch.setattr(Launcher, "_started", fork)
+    monkeypatch.setattr(plugins, "_try", try_once)
