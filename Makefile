@@ -28,7 +28,7 @@ types: $(READY)
 	$(BIN)/mypy
 
 tests: $(READY)
-	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --durations=25
+	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --no-loadscope-reorder --durations=25
 
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html

@@ -1,11 +1,61 @@
 import gc
+import os
+from functools import cache
 from pathlib import Path
 
 import pytest
+import typer
 
-from cembench.commands.cli import main
+from cembench.commands.cli import app, main
 
 pytest_plugins = ["tests.shared_server"]
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_auto_num_workers(config):
+    """One more than there are cores: now and then a worker waits for a process that it started."""
+    return len(os.sched_getaffinity(0)) + 1 if hasattr(os, "sched_getaffinity") else None
+
+
+#: Files that take a quarter of a minute or more, whatever their number of tests.
+LONG = (
+    "fuzz/test_campaign.py",
+    "report/test_report.py",
+    "running/test_local.py",
+    "meshes_gen/test_catalogue.py",
+    "running/cluster/test_client.py",
+    "running/test_cheats.py",
+    "running/test_pairing.py",
+    "commands/test_from_api.py",
+    "commands/test_cli.py",
+    "commands/test_reproduce.py",
+    "running/test_killed.py",
+    "test_files_of_the_user.py",
+    "validation/test_validate_verbs.py",
+    "commands/test_exit_codes.py",
+    "test_fuzzed_run.py",
+    "api/test_api.py",
+    "mesh/test_unpacking.py",
+    "algorithms/test_published.py",
+    "benchmarks/test_repeatability.py",
+    "report/test_html_browser.py",
+    "submissions/test_results_repository.py",
+)
+
+
+def pytest_collection_modifyitems(config, items):
+    """Begin with the long files where several processes share them: none is left for the end."""
+    if hasattr(config, "workerinput"):
+        first = {f"tests/{name}": place for place, name in enumerate(LONG)}
+        items.sort(key=lambda item: first.get(item.nodeid.partition("::")[0], len(LONG)))
+
+
+@pytest.fixture(scope="session", autouse=True)
+def nothing_waits_for_the_disk():
+    """Files are in place when they are renamed; only a loss of power needs them to be flushed."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(os, "fsync", lambda file: None)
+        yield
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -36,6 +86,12 @@ def count_calls(monkeypatch):
     return watch
 
 
+@cache
+def _commands():
+    """All commands, made once: making them takes longer than most calls."""
+    return typer.main.get_command(app)
+
+
 @pytest.fixture
 def cli(capsys, monkeypatch, tmp_path):
     """Run the command line in an empty folder: exit code, standard output, standard error.
@@ -47,6 +103,7 @@ def cli(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(workplace)
     monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr("cembench.running.environment.usable_cores", lambda: 1)
+    monkeypatch.setattr("cembench.commands.app.app", _commands())
 
     def call(*arguments):
         monkeypatch.setattr("sys.argv", ["cembench", *map(str, arguments)])

@@ -1,33 +1,55 @@
 """Run Python so that file modes bind it: root otherwise reads and writes whatever they say."""
 
+import ctypes
 import os
-import subprocess
 import sys
+import tempfile
+from contextlib import ExitStack
 
 import pytest
 
-#: The capabilities of root that pass over modes are given up, then the command is started.
-_BOUND = """
-import ctypes, os, sys
-drop, override, read_search = 24, 1, 2
-if os.getuid() == 0:
-    for capability in (override, read_search):
-        if ctypes.CDLL(None, use_errno=True).prctl(drop, capability, 0, 0, 0):
-            raise OSError(ctypes.get_errno(), "the capability cannot be given up")
-os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
-"""
+from cembench.commands.cli import main
+from tests.forked import forked
+
+#: The version of the kernel's sets of capabilities, and the two that pass over modes.
+_VERSION, _OVERRIDE, _READ_SEARCH = 0x20080522, 1, 2
 
 
-def bound_by_modes(folder, *arguments, **environment):
-    """Exit code, output and messages of `python ARGUMENTS` in a folder."""
+def _give_up():
+    """Give up the capabilities of root that pass over modes."""
+    if os.getuid() == 0:
+        libc = ctypes.CDLL(None, use_errno=True)
+        header, sets = (ctypes.c_uint32 * 2)(_VERSION, 0), (ctypes.c_uint32 * 6)()
+        failed = libc.capget(header, sets)
+        for number in range(2):  # the effective ones, and those that `access` looks at
+            sets[number] &= ~(1 << _OVERRIDE | 1 << _READ_SEARCH)
+        if failed or libc.capset(header, sets):
+            raise OSError(ctypes.get_errno(), "the capabilities cannot be given up")
+
+
+def bound_by_modes(folder, function):
+    """Exit code, output and messages of a function that a fork calls in a folder."""
     if os.name != "posix" or (os.getuid() == 0 and sys.platform != "linux"):
         pytest.skip("file modes do not bind this user")
-    done = subprocess.run(
-        [sys.executable, "-c", _BOUND, *map(str, arguments)],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        env=os.environ | environment,
-        check=False,
-    )
-    return done.returncode, done.stdout, done.stderr
+
+    def bound():
+        os.chdir(folder)
+        _give_up()
+        return function()
+
+    with ExitStack() as stack:
+        streams = [stack.enter_context(tempfile.TemporaryFile()) for _ in range(3)]
+        code = forked(bound, streams)
+        for stream in streams:
+            stream.seek(0)
+        return (code, *(stream.read().decode() for stream in streams[1:]))
+
+
+def command_bound_by_modes(folder, *words):
+    """Exit code, output and messages of a command."""
+
+    def command():
+        sys.argv = ["cembench", *words]
+        main()
+
+    return bound_by_modes(folder, command)

@@ -1,73 +1,110 @@
-"""One server from which a test process forks all that a run starts, instead of an interpreter each.
+"""Servers that outlive a run: what a run starts is forked from one that an earlier test left.
 
-Starting an interpreter takes a second, and a run starts several. Where a test is not about
-processes, it may use the fixture :func:`one_server`: what is measured still runs in a process of
-its own, which is forked from a server that has loaded only the libraries.
+Starting an interpreter takes a second, and a run starts several. With :func:`kept_servers` a run
+forks where it always does, from a server that is given back and not ended when the run is over.
+With :func:`one_server` it forks also what it starts as an interpreter of its own: for tests that
+are not about processes. A server has loaded only the libraries, whoever it has served.
 """
 
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
 from cembench.linear_algebra.backends import default_backend
+from cembench.running import launcher, plugins
 from cembench.running.environment import for_measuring
-from cembench.running.fork_server import ForkServer, ServerGoneError, can_fork
+from cembench.running.fork_server import ForkServer, can_fork
 from cembench.running.launcher import Launcher
-from cembench.running.process import run_limited
+
+#: Of the environment, what changes from test to test and is of no use to a process that measures.
+IRRELEVANT = ("PYTEST_CURRENT_TEST", "COLUMNS")
+#: How many servers may wait for the next run.
+MOST = 3
 
 
-class _Servers:
-    """The last server, with the environment and the back end that it was started with."""
+class _Kept(ForkServer):
+    """A server which is idle when it is closed, and then serves the next one who needs its like."""
 
-    def __init__(self):
-        self.key, self.server = None, None
+    key = None
+    #: In the order in which they were given back.
+    idle: ClassVar = []
 
-    def of(self, environment, backend):
-        key = backend, {k: v for k, v in environment.items() if k != "PYTEST_CURRENT_TEST"}
-        if self.key != key:
+    @classmethod
+    def of(cls, environment, backend):
+        """Return an idle server with this environment and back end, or a new one."""
+        key = backend, {k: v for k, v in environment.items() if k not in IRRELEVANT}
+        for server in cls.idle:
+            if server.key == key and server._process.poll() is None:
+                cls.idle.remove(server)
+                return server
+        server = cls(environment, backend)
+        server.key = key
+        return server
+
+    def close(self):
+        """Give it back; end the one that has waited longest where there are too many."""
+        if self.key is None:  # it did not start
             self.end()
-            self.server, self.key = ForkServer(environment, backend), key
-        return self.server
+        elif self not in self.idle:
+            self.idle.append(self)
+        for surplus in self.idle[:-MOST]:
+            self.idle.remove(surplus)
+            surplus.end()
 
     def end(self):
-        if self.server is not None:
-            self.server.close()
-        self.key, self.server = None, None
+        super().close()
 
 
 @pytest.fixture(scope="session")
 def _servers():
-    servers = _Servers()
-    yield servers
-    servers.end()
+    yield
+    while _Kept.idle:
+        _Kept.idle.pop().end()
 
 
 @pytest.fixture
-def one_server(_servers, monkeypatch):
-    """Fork checks, too, and all from one server, started before a test limits its process."""
-    if can_fork(1):
-        _servers.of(for_measuring(1), default_backend())
-    write, started = Launcher._write, Launcher._started
-
-    def fork(self, job, limits, log):
-        if self.number or not can_fork(job.cell.threads):  # several at a time need several servers
-            return started(self, job, limits, log)
-        try:
-            server = _servers.of(for_measuring(job.cell.threads), job.cell.backend)
-            path = self._write(job.model_copy(update={"parent": server.pid}))
-            return run_limited(server.forking(path), limits, log, stopped=self.stopped.is_set)
-        except ServerGoneError:
-            _servers.end()
-            return started(self, job, limits, log)
+def kept_servers(_servers, monkeypatch):
+    """Fork from servers of earlier tests, one started before a test limits its process."""
+    write = Launcher._write
 
     def write_absolute(self, job):
         """The server is not in the test's folder."""
-        plugins = tuple(
+        absolute = tuple(
             str(Path(plugin).absolute()) if plugin.endswith(".py") else plugin
             for plugin in job.plugins
         )
-        return write(self, job.model_copy(update={"plugins": plugins}))
+        return write(self, job.model_copy(update={"plugins": absolute}))
+
+    monkeypatch.setattr(launcher, "ForkServer", _Kept.of)
+    monkeypatch.setattr(Launcher, "_write", write_absolute)
+    if can_fork(1):
+        _Kept.of(for_measuring(1), default_backend()).close()
+
+
+#: What plug-ins that could be imported hold.
+_TRIED = set()
+
+
+@pytest.fixture
+def one_server(kept_servers, monkeypatch):
+    """Fork also what is started as an interpreter of its own; try each plug-in once."""
+    started, tried = Launcher._started, plugins._try
+
+    def try_once(plugin, seconds):
+        content = Path(plugin).read_bytes() if Path(plugin).is_file() else None
+        if content is None or content not in _TRIED:
+            tried(plugin, seconds)
+            _TRIED.add(content)
+
+    def fork(self, job, limits, log):
+        if not can_fork(job.cell.threads):
+            return started(self, job, limits, log)
+        server = _Kept.of(for_measuring(job.cell.threads), job.cell.backend)
+        try:
+            return self._run_by(server, job, limits, log) or started(self, job, limits, log)
+        finally:
+            server.close()
 
     monkeypatch.setattr(Launcher, "_started", fork)
-    monkeypatch.setattr(Launcher, "_forked", fork)
-    monkeypatch.setattr(Launcher, "_write", write_absolute)
+    monkeypatch.setattr(plugins, "_try", try_once)

@@ -8,6 +8,8 @@ from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from benchmarks.expressions import EYES, TIP, errors_of, expressions, read_scan, told_of
 from cembench.core.errors import ParameterError
 
+pytestmark = pytest.mark.usefixtures("one_server")
+
 
 @pytest.fixture
 def files(tmp_path):

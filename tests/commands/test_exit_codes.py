@@ -12,7 +12,7 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.commands.exit_codes import CLOSED_PIPE, FAULT, SYSTEM
 from cembench.mesh.files import write_mesh
-from tests.file_modes import bound_by_modes
+from tests.file_modes import command_bound_by_modes
 from tests.results.test_verify import write_pair
 
 CEMBENCH = [sys.executable, "-m", "cembench.commands.cli"]
@@ -159,7 +159,7 @@ def test_status_of_a_read_only_run(tmp_path):
     (store.folder / "lock").touch()
     for place in [store.folder, *store.folder.rglob("*")]:
         place.chmod(0o555 if place.is_dir() else 0o444)
-    code, out, err = bound_by_modes(tmp_path, "-m", "cembench.commands.cli", "status", "run")
+    code, out, err = command_bound_by_modes(tmp_path, "status", "run")
     for place in [store.folder, *store.folder.rglob("*")]:
         place.chmod(0o755)
     assert (code, err) == (0, "")
@@ -181,7 +181,7 @@ def test_a_folder_that_may_not_be_written_to_is_told(tmp_path, verb):
     store = write_pair(tmp_path / "run")
     for place in [store.folder, *store.folder.rglob("*")]:
         place.chmod(0o555 if place.is_dir() else 0o444)
-    code, _, err = bound_by_modes(tmp_path, "-m", "cembench.commands.cli", *verb)
+    code, _, err = command_bound_by_modes(tmp_path, *verb)
     for place in [store.folder, *store.folder.rglob("*")]:
         place.chmod(0o755)
     assert code == 2
@@ -196,7 +196,7 @@ def test_a_folder_that_may_not_be_written_to_is_told(tmp_path, verb):
 def test_a_folder_that_may_not_be_read_is_told(tmp_path, verb, hidden):
     store = write_pair(tmp_path / "run")
     (store.folder / hidden).chmod(0)
-    code, out, err = bound_by_modes(tmp_path, "-m", "cembench.commands.cli", *verb)
+    code, out, err = command_bound_by_modes(tmp_path, *verb)
     (store.folder / hidden).chmod(0o755)
     assert (code, out) == (2, "")
     assert "Permission denied" in err or "not readable" in err
@@ -204,9 +204,7 @@ def test_a_folder_that_may_not_be_read_is_told(tmp_path, verb, hidden):
 
 def test_a_mesh_folder_that_may_not_be_read_is_not_called_empty(tmp_path):
     (tmp_path / "meshes").mkdir(mode=0)
-    code, _, err = bound_by_modes(
-        tmp_path, "-m", "cembench.commands.cli", "run", "--mesh-dir", "meshes", "--dry-run"
-    )
+    code, _, err = command_bound_by_modes(tmp_path, "run", "--mesh-dir", "meshes", "--dry-run")
     assert code == 2
     assert "not readable" in err
 

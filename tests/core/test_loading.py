@@ -99,7 +99,7 @@ def test_what_may_not_be_read_is_not_taken_for_empty(tmp_path):
         "    try: look(Path('hidden')); print('read')\n"
         "    except RecordError as error: print(error)\n"
     )
-    code, out, err = bound_by_modes(tmp_path, "-c", script)
+    code, out, err = bound_by_modes(tmp_path, lambda: exec(script))
     hidden.chmod(0o755)
     assert code == 0, err
     assert out.count("Permission denied") == 3

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.campaign.hard_meshes import FAMILIES
 from tests.campaign.journal import Entry
 
 ROOT = Path(__file__).parents[2]
@@ -30,9 +31,9 @@ def entries_of(out):
 
 @pytest.fixture(scope="session")
 def short_campaign(tmp_path_factory):
-    """The folder of a campaign with 300 files and 30 meshes."""
+    """The folder of a campaign with 300 files and a mesh of each family."""
     out = tmp_path_factory.mktemp("fuzz")
-    done = run_campaign(out, "--files", 300, "--meshes", 30, "--kills", 0)
+    done = run_campaign(out, "--files", 300, "--meshes", len(FAMILIES), "--kills", 0)
     assert done.returncode in (0, 1), done.stderr
     return out
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
@@ -11,7 +16,9 @@ from cembench.core.errors import MeshError
 from cembench.core.extras import MissingExtra
 from cembench.core.notices import NoticeKind
 from cembench.mesh.files import read_mesh, read_soup, write_mesh
+from cembench.mesh.formats import apart
 from cembench.mesh.triangle_mesh import TriangleMesh
+from tests.forked import forked
 
 
 @pytest.fixture(scope="module")
@@ -148,6 +155,21 @@ def test_gifti(disk, tmp_path):
         read_mesh(tmp_path / "b.gii")
 
 
+@pytest.fixture
+def forked_readers(monkeypatch):
+    """Libraries read in forks of this process: twenty-five interpreters would load them anew."""
+
+    def run(command, check, **streams):
+        assert set(streams.values()) == {subprocess.DEVNULL}
+        assert command[:3] == [sys.executable, "-m", apart.__name__]
+        with Path(os.devnull).open("r+b") as nowhere:
+            code = forked(lambda: apart._main(*command[3:]), [nowhere] * 3)
+        return subprocess.CompletedProcess(command, code)
+
+    monkeypatch.setattr(apart.subprocess, "run", run)
+
+
+@pytest.mark.usefixtures("forked_readers")
 @pytest.mark.parametrize("suffix", [".vtk", ".vtu", ".vtp", ".glb", ".gii"])
 def test_a_file_cut_short_or_of_another_kind_is_an_error(disk, tmp_path, suffix, capfd):
     pytest.importorskip("meshio")

@@ -78,16 +78,17 @@ def ok(algorithm, mesh, seconds):
     return outcome, found.uv
 
 
-def write_run(folder, policies=POLICIES):
+def write_run(folder, policies=POLICIES, algorithms=tuple(SECONDS)):
     """The run: two models, another surface, cells that failed, timed out and are missing."""
     store = Store(folder)
     scale = count(1)
     for row, mesh in meshes().items():
         size = next(scale)
         for policy in policies:
-            for algorithm, seconds in SECONDS.items():
+            for algorithm in algorithms:
                 if algorithm == "ldm" and row == "":
                     continue  # missing
+                seconds = SECONDS[algorithm]
                 uv = None
                 if algorithm == "qiem" and row == "Chinese Vase":
                     outcome = Outcome(status="failed", cause="it_gave up & 100 % lost")

@@ -9,6 +9,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.document import Claim, Figure, Gap, Table, items_of, plain, sections_of
 from cembench.report.write_report import write_report
 from cembench.results.papers import find_paper
+from tests.report.conftest import drawing_little
 
 FOLDER = Path(__file__).parents[1] / "papers/another"
 PAPER = find_paper(str(FOLDER))
@@ -16,7 +17,8 @@ PAPER = find_paper(str(FOLDER))
 
 @pytest.fixture(scope="module")
 def report(small_run, tmp_path_factory):
-    return write_report(small_run, tmp_path_factory.mktemp("another"), "c", paper=PAPER)
+    with drawing_little():
+        return write_report(small_run, tmp_path_factory.mktemp("another"), "c", paper=PAPER)
 
 
 def test_a_paper_costs_few_lines():
@@ -66,7 +68,7 @@ def test_a_run_without_any_of_its_models_is_said(small_run):
         Evidence.of(small_run, paper)
 
 
-def test_the_command_takes_a_folder(cli, small_run):
+def test_the_command_takes_a_folder(cli, small_run, quick_drawing):
     told = cli("report", small_run, "-o", "out", "--paper", FOLDER, "--json")[1]
     assert '"title": "Maps onto Circles: its claims' in told
     code, _, error = cli("report", small_run, "-o", "out", "--paper", "nowhere")

@@ -351,7 +351,7 @@ def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
 
 def test_other_processes_draw_the_same_pictures_and_plots(monkeypatch, tmp_path):
     """One surface lies in the run, the other does not."""
-    store = write_run(tmp_path / "run", ("reuse",))
+    store = write_run(tmp_path / "run", ("reuse",), ("cem", "lscm"))
     (tmp_path / "run" / "meshes" / f"{meshes()[''].hash[:32]}.npz").unlink()
     write_report(store.folder, tmp_path / "one", "c")
     monkeypatch.setattr(plots, "_drawn", None)

@@ -339,7 +339,7 @@ def slows_others(mesh: DiskMesh) -> Parameterization:
         Cholesky.fast = honestly
 
         def slow(*given, **named):
-            for _ in range(40):
+            for _ in range(12):
                 Cholesky.fast(*given, **named)
 
         Cholesky.slow = slow

@@ -50,6 +50,7 @@ def test_a_forked_process_finds_pinned_threads_its_own_group_and_no_algorithm_lo
         assert "glibc.malloc.hugetlb=" in told
 
 
+@pytest.mark.usefixtures("kept_servers")
 @pytest.mark.parametrize(
     ("name", "status", "cause"),
     [

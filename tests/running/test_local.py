@@ -25,6 +25,7 @@ from cembench.running.timing import CellTimer
 from cembench.running.watcher import Watcher
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
+pytestmark = pytest.mark.usefixtures("kept_servers")
 MEMORY = 500 * 2**20
 
 
@@ -57,7 +58,9 @@ def tasks_of(*names, faces=600, **how):
         ("exits-politely", "failed", "SystemExit: 0"),
     ],
 )
-def test_every_fault_is_a_status_with_its_cause(name, status, cause):
+def test_every_fault_is_a_status_with_its_cause(name, status, cause, request):
+    if name not in ("segfaults", "exits", "folded"):  # which end an interpreter of their own
+        request.getfixturevalue("one_server")
     (task,) = tasks_of(name)
     record, uv = map_once(task)
     assert record.outcome.status == status
@@ -69,6 +72,7 @@ def test_every_fault_is_a_status_with_its_cause(name, status, cause):
     assert (uv is None) == (name not in kept)
 
 
+@pytest.mark.usefixtures("one_server")
 def test_a_large_surface_that_memory_cannot_take_is_not_tried(monkeypatch):
     monkeypatch.setattr("cembench.running.timing.expected_bytes", lambda *_: 2.0 * MEMORY)
     (task,) = tasks_of("good")

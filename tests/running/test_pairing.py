@@ -21,6 +21,8 @@ from cembench.running.watcher import Watcher
 from tests.running.test_cheats import CHEATS, surface  # noqa: F401 - a fixture
 from tests.running.test_schedule import Invented, cells
 
+pytestmark = pytest.mark.usefixtures("kept_servers")
+
 
 def test_the_scatter_between_processes_is_told_from_that_within_one():
     rng = np.random.default_rng(5)

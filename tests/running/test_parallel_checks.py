@@ -84,6 +84,7 @@ def test_a_fault_of_a_checker_is_raised_and_the_others_are_stopped():
     assert all(checker.stopped.is_set() for checker in checkers)
 
 
+@pytest.mark.usefixtures("kept_servers")
 def test_a_run_with_two_jobs_has_the_records_of_one_with_one(tmp_path):
     registry = load_registry()
     chosen = [registry.algorithm(name) for name in ("lscm", "harmonic-circle")]

@@ -3,6 +3,11 @@ import pytest
 from cembench.validation import surfaces
 
 
+@pytest.fixture(autouse=True)
+def quick_processes(one_server):
+    """Findings are tested here, not the processes that calls are made in."""
+
+
 @pytest.fixture(scope="package", autouse=True)
 def surfaces_made_once():
     """Meshes are frozen, so that one serves all tests."""

@@ -81,7 +81,7 @@ def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_
     assert again.steps == []
 
 
-@pytest.mark.parametrize("look_every", [module.LOOK_EVERY, 60.0], ids=["looks", "hears-first"])
+@pytest.mark.parametrize("look_every", [module.LOOK_EVERY, 15.0], ids=["looks", "hears-first"])
 def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(
     client, tmp_path, monkeypatch, look_every
 ):

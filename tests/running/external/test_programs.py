@@ -24,6 +24,7 @@ from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.validation.quality import compare_speed
 
 SCRIPT = Path(__file__).with_name("misbehaves.py")
+pytestmark = pytest.mark.usefixtures("one_server")
 MESH = flat_disk(600)
 
 
