@@ -46,11 +46,12 @@ class Crossings:
     along: dict[int, tuple[int, int]] = field(default_factory=dict)
     #: The first crossing of each given edge.
     first: list[int] = field(default_factory=list)
-    #: Of each crossing: the one before and after on its given edge, that, and 1 if the given edge
-    #: comes from the left of the other one, else -1.
+    #: Of each crossing: the one before and after on its given edge, that, the edge it lies on, and
+    #: 1 if the given edge comes from the left of that, else -1.
     before: list[int] = field(default_factory=list)
     after: list[int] = field(default_factory=list)
     given: list[int] = field(default_factory=list)
+    edge_of: list[int] = field(default_factory=list)
     side: list[int] = field(default_factory=list)
 
     @classmethod
@@ -105,7 +106,7 @@ class Crossings:
     def _leaves(self, x: int, y: int, sides: Sequence[int]) -> int:
         """Return the half-edge, of two, by which a path from x leaves a triangle at y."""
         for h in sides:
-            if self.on_edge[self.edge[h]] and self._inside(y, h) == x and y in self._along(h):
+            if self.edge_of[y] == self.edge[h] and self._inside(y, h) == x:
                 return h
         raise AssertionError("a path leaves a triangle nowhere")
 
@@ -134,7 +135,8 @@ class Crossings:
         self.edge[3 * t + 2] = self.edge[3 * s + 2] = e
         self.sign[3 * t + 2], self.sign[3 * s + 2] = 1, -1
         self.on_edge[e] = [
-            self._insert(*(one if one[3] != END else (END, END, from_i, own))) for one in crossing
+            self._insert(e, *(one if one[3] != END else (END, END, from_i, own)))
+            for one in crossing
         ][::-1]
 
     def _across(
@@ -198,13 +200,14 @@ class Crossings:
         if y != END:
             self.before[y] = x
 
-    def _insert(self, x: int, y: int, x_first: bool, given: int) -> int:
-        """Add a crossing between x, on the side of i, and y; return it."""
+    def _insert(self, e: int, x: int, y: int, x_first: bool, given: int) -> int:
+        """Add a crossing with e between x, on the side of i, and y; return it."""
         new = len(self.before)
         for values, value in (
             (self.before, END),
             (self.after, END),
             (self.given, given),
+            (self.edge_of, e),
             (self.side, 1 if x_first else -1),
         ):
             values.append(value)

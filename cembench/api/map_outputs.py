@@ -21,6 +21,7 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
 from cembench.results.records import Record
+from cembench.running.measure import refinement_of
 
 
 def write_extras(
@@ -109,6 +110,29 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
             "{listed}).",
             name=candidates[0].name,
             listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
+        )
+
+
+def check_overlay_options(
+    candidates: Sequence[Algorithm], *, cut: bool, bake: bool, apart: bool, threads: int
+) -> None:
+    """Raise :class:`ParameterError` for what a map on a refined mesh does not go with."""
+    refinement_of(candidates[0])
+    if cut:
+        raise ParameterError.about(
+            "{overlay} refines both banks of a cut in different places, so the surface cannot be "
+            "written uncut: leave out {cut}, and map what {command} writes.",
+            command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
+        )
+    if bake:
+        raise ParameterError.about(
+            "{overlay} makes triangles that the texture's own UVs do not know: leave out {bake}, "
+            "and use {checker}."
+        )
+    if apart or threads > 1:
+        raise ParameterError.about(
+            "{overlay} maps in this process, with one thread and no limits: leave out {timeout}, "
+            "{memory_bytes} and {threads}."
         )
 
 
@@ -202,10 +226,8 @@ def draw_maps(
         words = caption(record.outcome.metrics)
         write_preview(shells.parts[0].mesh, maps[0], picture, title=title, caption=words)
         return
-    starts = np.cumsum([0, *(part.mesh.n for part in shells.parts)])
-    V = np.concatenate([part.mesh.V for part in shells.parts])
-    F = np.concatenate([p.mesh.F + k for p, k in zip(shells.parts, starts, strict=False)])
-    mesh = TriangleMesh.trusted(V, F, shells.path.stem)
+    joined = Shells.of(shells.parts)
+    mesh = TriangleMesh.trusted(joined.V, joined.F, shells.path.stem)
     title = f"{shells.path.stem}: {len(maps)} surfaces"
     uv = np.concatenate(packed(maps, areas_of(shells.parts), equal=equal))
     write_preview(mesh, uv, picture, title=title, turned=False)
