@@ -103,8 +103,9 @@ def map_files(
     preview : bool
         Draw a PNG beside the output; folded triangles are red.
     certificate : bool
-        Enclose the conformal modulus of each disk between four boundary points, or of a surface
-        with one hole, which a conformal map keeps, and compare the map's. Takes two solves.
+        Enclose the conformal modulus of each disk between four boundary points, or the capacities
+        of the holes, which a conformal map keeps, and compare the map's. Takes two solves, or two
+        for each hole.
     overlay : bool
         Map with cetm-flips, and write the mesh cut along the edges of its flipped triangulation: a
         refinement of the surface, with more triangles, on which the map has no folds.

@@ -233,6 +233,6 @@ def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
 
     try:
         found = certificate_of(mesh, uv, record.target)
+        return "only for maps to the disk" if found is None else found.words(uv[found.corners])
     except AlgorithmFailed as error:
         return f"none: {error}"
-    return "only for maps to the disk" if found is None else found.words(uv[found.corners])

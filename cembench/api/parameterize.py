@@ -33,7 +33,7 @@ from cembench.running.surfaces import SurfaceInput, load_surface
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cembench.conformal.certificate import Certificate
+    from cembench.conformal.certificate import Certificate, HolesCertificate
 
 #: How thoroughly a map is checked.
 Check = Literal["full", "fast"]
@@ -169,17 +169,17 @@ class Result:
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
 
-    def certificate(self) -> Certificate:
+    def certificate(self) -> Certificate | HolesCertificate:
         """Enclose the conformal modulus of the surface, which the map should have.
 
-        Four boundary points make a disk a quadrilateral; a surface with one hole has a modulus of
-        its own. Two harmonic functions enclose it from both sides without a known map, and every
-        conformal map keeps it. A map whose modulus is outside is not conformal; one within may
-        still be wrong elsewhere.
+        Four boundary points make a disk a quadrilateral, whose modulus two harmonic functions
+        enclose from both sides without a known map; a surface with holes has their capacities,
+        enclosed by two functions for each hole. Every conformal map keeps both. A map whose modulus
+        or circles are outside is not conformal; one within may still be wrong elsewhere.
 
         Returns
         -------
-        Certificate
+        Certificate or HolesCertificate
             The bounds; ``words(result.z[certificate.corners])`` compares the map with them.
 
         Raises
@@ -187,7 +187,7 @@ class Result:
         ParameterError
             The map is not one to the disk.
         AlgorithmFailed
-            The boundary has fewer than four vertices, or the surface several holes.
+            The boundary has fewer than four vertices.
 
         Examples
         --------
