@@ -70,15 +70,15 @@ BUDGETS = {
     "core": 2_100,
     "mesh": 5_950,
     "linear_algebra": 1_500,
-    "conformal": 5_850,
+    "conformal": 6_300,
     "registry": 950,
     "results": 4_550,
-    "running": 7_250,
+    "running": 7_300,
     "drawing": 1_600,
     "report": 8_150,
     "validation": 2_350,
     "morphing": 1_750,
-    "api": 6_400,
+    "api": 6_450,
     "commands": 2_850,
 }
 
