@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
+from time import perf_counter
 from typing import Annotated
 
 from pydantic import Field
 
+from cembench.conformal.even_weights import evened
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
@@ -23,6 +26,9 @@ CANDIDATES = {
     "cetm": Candidate(cetm, cost=4),
     "cetm-flips": Candidate(cetm_flips, cost=8),
 }
+
+#: The most steps from the best map, which the last of them do not improve any more.
+MOST_STEPS = 10
 
 
 @algorithm(
@@ -44,7 +50,17 @@ def best(
     has the smallest angle errors everywhere. direct-cem always has a valid map, with its usual
     `back` and at the least E_C; cetm has slightly better angles where the mesh has a flat metric;
     cetm-flips is better on surfaces that must be scaled very unevenly. An algorithm that would
-    probably end later than `seconds` after the start is left out. `chosen` names the algorithm,
-    `tried` has the mean angle error of each, in degrees.
+    probably end later than `seconds` after the start is left out. Within this time, steps whose
+    weights count all triangles alike lower the mean angle error of the best map further, until one
+    wins less than a thousandth (`even_steps`). `chosen` names the algorithm, `tried` has the mean
+    angle error of each, in degrees, before these steps.
     """
-    return best_of(mesh, CANDIDATES, seconds, repair=repair)
+    start = perf_counter()
+    found = best_of(mesh, CANDIDATES, seconds, repair=repair)
+    uv, steps = found.uv, 0
+    while steps < MOST_STEPS and perf_counter() - start < seconds:
+        uv, taken = evened(mesh, uv, 1)
+        if not taken:
+            break
+        steps += 1
+    return replace(found, uv=uv, extras=found.extras | {"even_steps": steps})

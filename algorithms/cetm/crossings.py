@@ -44,14 +44,14 @@ class Crossings:
     #: runs the same way, else -1.
     on_edge: list[list[int]] = field(default_factory=list)
     along: dict[int, tuple[int, int]] = field(default_factory=dict)
-    #: The first and the last crossing of each given edge.
+    #: The first crossing of each given edge.
     first: list[int] = field(default_factory=list)
-    last: list[int] = field(default_factory=list)
-    #: Of each crossing: the one before and after on its given edge, that, and 1 if the given edge
-    #: comes from the left of the other one, else -1.
+    #: Of each crossing: the one before and after on its given edge, that, the edge it lies on, and
+    #: 1 if the given edge comes from the left of that, else -1.
     before: list[int] = field(default_factory=list)
     after: list[int] = field(default_factory=list)
     given: list[int] = field(default_factory=list)
+    edge_of: list[int] = field(default_factory=list)
     side: list[int] = field(default_factory=list)
 
     @classmethod
@@ -69,7 +69,6 @@ class Crossings:
             on_edge=[[] for _ in range(count)],
             along={e: (e, 1) for e in range(count)},
             first=[END] * count,
-            last=[END] * count,
         )
 
     @property
@@ -107,7 +106,7 @@ class Crossings:
     def _leaves(self, x: int, y: int, sides: Sequence[int]) -> int:
         """Return the half-edge, of two, by which a path from x leaves a triangle at y."""
         for h in sides:
-            if self.on_edge[self.edge[h]] and self._inside(y, h) == x and y in self._along(h):
+            if self.edge_of[y] == self.edge[h] and self._inside(y, h) == x:
                 return h
         raise AssertionError("a path leaves a triangle nowhere")
 
@@ -136,7 +135,8 @@ class Crossings:
         self.edge[3 * t + 2] = self.edge[3 * s + 2] = e
         self.sign[3 * t + 2], self.sign[3 * s + 2] = 1, -1
         self.on_edge[e] = [
-            self._insert(*(one if one[3] != END else (END, END, from_i, own))) for one in crossing
+            self._insert(e, *(one if one[3] != END else (END, END, from_i, own)))
+            for one in crossing
         ][::-1]
 
     def _across(
@@ -148,35 +148,41 @@ class Crossings:
         its given edge. An edge ij that is itself a given one is marked by the given edge END.
         """
         (n1, n2), (m1, m2) = one, other
-        found: list[tuple[int, int, bool, int]] = []
+        own = [(END, END, True, END)] if self.edge[h] in self.along else []
+        return [
+            *self._entering(n2, (h, n1), g, (m1, m2)),
+            *self._ending(n1),
+            *own,
+            *self._ending(m2),
+            *self._entering(m1, (g, m2), h, (n2, n1)),
+        ]
 
-        def comes_first(x: int, half: int) -> bool:
-            """Whether the path of x, on the side of i, goes into the quad after x."""
-            return self.side[x] != self.sign[half]
+    def _entering(
+        self, side: int, leaving: tuple[int, int], beyond: int, back: tuple[int, int]
+    ) -> list[tuple[int, int, bool, int]]:
+        """Return the paths of :meth:`_across` that enter the quad by a side on that of i.
 
-        for x in self._along(n2):
-            y = self._inside(x, n2)
-            if y != END and self._leaves(x, y, (h, n1)) == h:
-                x_in, y = y, self._inside(y, g)
-                if y == END or self._leaves(x_in, y, (m1, m2)) == m1:
+        They leave its triangle by ij, the first of `leaving`, or another side. Those over ij leave
+        the other triangle, entered by `beyond`, by the sides of `back`; by the first of these they
+        stay on the side of i.
+        """
+        found = []
+        for x in self._along(side):
+            y = self._inside(x, side)
+            if y != END and self._leaves(x, y, leaving) == leaving[0]:
+                on_ij, y = y, self._inside(y, beyond)
+                if y == END or self._leaves(on_ij, y, back) == back[0]:
                     continue
-            found.append((x, y, comes_first(x, n2), self.given[x]))
-        for y in self._along(n1)[::-1]:
-            if self._inside(y, n1) == END:
-                found.append((END, y, self.side[y] == self.sign[n1], self.given[y]))
-        if self.edge[h] in self.along:
-            found.append((END, END, True, END))
-        for y in self._along(m2)[::-1]:
-            if self._inside(y, m2) == END:
-                found.append((END, y, self.side[y] == self.sign[m2], self.given[y]))
-        for x in self._along(m1):
-            y = self._inside(x, m1)
-            if y != END and self._leaves(x, y, (g, m2)) == g:
-                x_in, y = y, self._inside(y, h)
-                if y == END or self._leaves(x_in, y, (n1, n2)) == n2:
-                    continue
-            found.append((x, y, comes_first(x, m1), self.given[x]))
+            found.append((x, y, self.side[x] != self.sign[side], self.given[x]))
         return found
+
+    def _ending(self, side: int) -> list[tuple[int, int, bool, int]]:
+        """Return the paths of :meth:`_across` from the opposite corner to a side on that of j."""
+        return [
+            (END, y, self.side[y] == self.sign[side], self.given[y])
+            for y in self._along(side)[::-1]
+            if self._inside(y, side) == END
+        ]
 
     def _remove(self, x: int, h: int, e: int) -> None:
         """Take a crossing with the flipped edge out of its path."""
@@ -191,18 +197,17 @@ class Crossings:
             self.first[given] = y
         else:
             self.after[x] = y
-        if y == END:
-            self.last[given] = x
-        else:
+        if y != END:
             self.before[y] = x
 
-    def _insert(self, x: int, y: int, x_first: bool, given: int) -> int:
-        """Add a crossing between x, on the side of i, and y; return it."""
+    def _insert(self, e: int, x: int, y: int, x_first: bool, given: int) -> int:
+        """Add a crossing with e between x, on the side of i, and y; return it."""
         new = len(self.before)
         for values, value in (
             (self.before, END),
             (self.after, END),
             (self.given, given),
+            (self.edge_of, e),
             (self.side, 1 if x_first else -1),
         ):
             values.append(value)

@@ -150,10 +150,9 @@ def _points(
     chosen: Sequence[int],
 ) -> tuple[Real, Complex]:
     """Return the refined mesh's vertices in space, and in an image of the equilateral triangle."""
-    edge_of = {x: e for e, there in enumerate(paths.on_edge) for x in there}
     given, flipped = start.first_half_edge, paths.first_half_edge
     h = np.array([given[paths.given[x]] for x in chosen], dtype=np.int64)
-    f = np.array([flipped[edge_of[x]] for x in chosen], dtype=np.int64)
+    f = np.array([flipped[paths.edge_of[x]] for x in chosen], dtype=np.int64)
     t = np.array([on_given[x] for x in chosen])[:, None]
     s = np.array([on_flipped[x] for x in chosen])
     a, b = mesh.F[h // 3, h % 3], mesh.F[h // 3, (h % 3 + 1) % 3]
@@ -262,11 +261,10 @@ def _straight(paths: Crossings, T: Triangulation) -> dict[int, Place]:
 
 def _behind(paths: Crossings, T: Triangulation) -> Iterator[tuple[list[int], list[int]]]:
     """Give each given edge's crossings, with the half-edges whose triangles lie behind these."""
-    edge_of = {x: e for e, there in enumerate(paths.on_edge) for x in there}
     along = paths.first_half_edge
     for given in range(len(paths.first)):
         if path := paths.path(given):
-            ways = [(x, along[edge_of[x]]) for x in path]
+            ways = [(x, along[paths.edge_of[x]]) for x in path]
             yield path, [h if paths.side[x] > 0 else int(T.twin[h]) for x, h in ways]
 
 

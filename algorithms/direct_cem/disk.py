@@ -15,6 +15,7 @@ from cembench.conformal.boundary_energy import EnergyModel, Minimum, in_gauge, m
 from cembench.conformal.boundary_modes import estimated_energy
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
+from cembench.conformal.even_weights import with_even_steps
 from cembench.conformal.filled_start import arcs_of_measure
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure
@@ -39,6 +40,7 @@ SURELY_MORE = 2
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
+@with_even_steps
 @with_last_resort
 def direct_cem(
     mesh: DiskMesh,
@@ -48,6 +50,7 @@ def direct_cem(
     gauge: Gauge = "boundary",
     back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
     delaunay: bool = True,
+    even: Annotated[int, Field(ge=0, le=100)] = 0,
     repair: bool = True,
     last_resort: bool = True,
 ) -> Parameterization:
@@ -74,9 +77,12 @@ def direct_cem(
     would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
     Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So
     the boundary is finally moved back towards it as far as that raises E_C by at most the share
-    `back`; 0 keeps the least E_C. Folds are repaired as in CEM (`fold_repairs`); `last_resort`
-    makes the map valid in any case.
+    `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most `even`
+    more steps, each as dear as all of this, lower the mean angle error with weights that count all
+    triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired as in CEM
+    (`fold_repairs`); `last_resort` makes the map valid in any case.
     """
+    del even  # the decorator's
     L = laplacian(mesh, delaunay=delaunay)
     with phase("start"):
         middle = gauge_measure(mesh, "triangle", mesh.boundary)

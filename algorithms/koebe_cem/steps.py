@@ -25,7 +25,7 @@ from cembench.conformal.laplacian import cotangent_laplacian, laplacian
 from cembench.conformal.patches import disk_patch, fan_patch
 from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area
 from cembench.core.clock import phase
-from cembench.core.errors import AlgorithmFailed
+from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import MapStep
 from cembench.linear_algebra.dense_cholesky import DenseCholesky
 from cembench.mesh.triangle_mesh import HoledMesh
@@ -107,9 +107,11 @@ def koebe_steps(
             points = mesh.V if before is None else np.stack([before.real, before.imag], axis=1)
             if weights == "plane" and before is not None:
                 surface = BorderedLaplacian(mesh, _planar_laplacian(points, mesh.F), loops)
-            with phase("patches"):
-                glued = {j: _patch(points[loop], patches) for j, loop in enumerate(loops) if j != k}
-            disk = _FilledSurface(surface, glued, k)
+            closed = {j: points[loop] for j, loop in enumerate(loops) if j != k}
+            try:
+                disk = _FilledSurface(surface, closed, k, patches)
+            except NotPositiveDefinite:  # rims put in order crowd: fill their own polygons
+                disk = _FilledSurface(surface, closed, k, "fans")
             starts = [kept[k] if k in kept else disk.start(*pole(points, mesh.F))]
             if before is not None:
                 starts += _projected(before[loops[k]])
@@ -160,19 +162,21 @@ def finished(
 
 
 class _FilledSurface:
-    """A surface with patches on all of its boundaries except number `k`: a disk.
+    """A surface with patches on all of its boundaries, `rims`, except number `k`: a disk.
 
     The closed boundaries c are eliminated too, so that an iteration of CEM needs only the open
     boundary o and the interior: f_c = -W f_o, and half of f_o^* S f_o is the Dirichlet energy.
     """
 
-    def __init__(self, surface: BorderedLaplacian, patches: dict[int, Real], k: int) -> None:
+    def __init__(
+        self, surface: BorderedLaplacian, rims: dict[int, Real], k: int, patches: Patches
+    ) -> None:
         self._surface = surface
         o = self._open = surface.parts[k]
         with phase("patches"):
             A = surface.S.copy()
-            for j, P in patches.items():
-                A[surface.parts[j], surface.parts[j]] += P
+            for j, rim in rims.items():
+                A[surface.parts[j], surface.parts[j]] += _patch(rim, patches)
             closed = np.ones(len(A), dtype=bool)
             closed[o] = False
             c = self._closed = np.flatnonzero(closed)

@@ -9,12 +9,15 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from cembench.core.program import matlab_string, of_matlab_function
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import external_program
+
+C = TypeVar("C", bound=Callable[..., Any])
 
 #: Functions of MATLAB that Octave lacks.
 SHIMS = Path(__file__).with_name("octave")
@@ -22,42 +25,42 @@ SHIMS = Path(__file__).with_name("octave")
 DEPTH = 100_000
 
 
-def declaration(variable: str, function: str, where: str) -> dict[str, Any]:
-    """Return the declaration of a program whose function's file this variable names.
+def matlab_program(name: str, function: str, where: str, **about: Any) -> Callable[[C], C]:
+    """Declare the program whose function's file CEMBENCH_NAME, a variable, names.
 
     Parameters
     ----------
-    variable, function, where : str
-        The variable, the usual name of the function, and where the program is published.
+    name, function, where : str
+        The algorithm's name, the usual name of the function, and where the program is published.
+    **about
+        As for :func:`cembench.registry.external_program`.
 
     """
+    variable = f"CEMBENCH_{name.upper().replace('-', '_')}"
     remedy = (
         f"Get it from {where}, let {variable} name the file of its function ({function}.m), and "
         "install Octave (in Debian: apt-get install octave-cli) or MATLAB"
     )
-    named = os.environ.get(variable, "")
-    if not Path(named).is_file():
-        return {"command": f"{function}.m {{input}} {{output}}", "remedy": remedy}
-    file = Path(named).absolute()
-    declared = of_matlab_function(file)
-    words = shlex.split(declared["command"])
-    path = f"addpath(genpath({matlab_string(file.parent)})); "
-    if declared["version"]:
-        path = f"max_recursion_depth({DEPTH}); addpath({matlab_string(SHIMS)}); {path}"
-    command = shlex.join([*words[:-1], path + words[-1]])
-    return {**declared, "command": command, "remedy": remedy}
+    declared: dict[str, Any] = {"command": f"{function}.m {{input}} {{output}}"}
+    named = Path(os.environ.get(variable, ""))
+    if named.is_file():
+        file = named.absolute()
+        declared = of_matlab_function(file)
+        words = shlex.split(declared["command"])
+        path = f"addpath(genpath({matlab_string(file.parent)})); "
+        if declared["version"]:
+            path = f"max_recursion_depth({DEPTH}); addpath({matlab_string(SHIMS)}); {path}"
+        declared["command"] = shlex.join([*words[:-1], path + words[-1]])
+    return external_program(name, remedy=remedy, **about, **declared)
 
 
-@external_program(
+@matlab_program(
     "fdm-program",
+    "disk_conformal_map",
+    "https://github.com/garyptchoi/disk-conformal-map",
     title="FDM, its authors' program",
     target="disk",
     source="Choi & Lui 2015; disk_conformal_map.m",
-    **declaration(
-        "CEMBENCH_FDM_PROGRAM",
-        "disk_conformal_map",
-        "https://github.com/garyptchoi/disk-conformal-map",
-    ),
 )
 def fdm_program(mesh: DiskMesh) -> None:
     """Map a disk by the fast disk map, as its authors programmed it.
@@ -67,16 +70,13 @@ def fdm_program(mesh: DiskMesh) -> None:
     """
 
 
-@external_program(
+@matlab_program(
     "ldm-program",
+    "lineardiskmap",
+    "the authors (https://www.math.cuhk.edu.hk/~ptchoi)",
     title="LDM, its authors' program",
     target="disk",
     source="Choi & Lui 2018; lineardiskmap.m",
-    **declaration(
-        "CEMBENCH_LDM_PROGRAM",
-        "lineardiskmap",
-        "the authors (https://www.math.cuhk.edu.hk/~ptchoi)",
-    ),
 )
 def ldm_program(mesh: DiskMesh) -> None:
     """Map a disk by the linear disk map, as its authors programmed it.
@@ -86,16 +86,13 @@ def ldm_program(mesh: DiskMesh) -> None:
     """
 
 
-@external_program(
+@matlab_program(
     "poly-annulus-program",
+    "poly_annulus_conformal_map",
+    "https://github.com/garyptchoi/poly-annulus-conformal-map",
     title="PACM, its author's program",
     target="circular holes",
     source="Choi 2021; poly_annulus_conformal_map.m",
-    **declaration(
-        "CEMBENCH_POLY_ANNULUS_PROGRAM",
-        "poly_annulus_conformal_map",
-        "https://github.com/garyptchoi/poly-annulus-conformal-map",
-    ),
 )
 def poly_annulus_program(mesh: HoledMesh) -> None:
     """Map a surface with holes to a disk with circular holes, as the author programmed it.

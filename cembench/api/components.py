@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -59,6 +60,20 @@ class Shells:
     parts: tuple[SurfaceFile, ...]
     vertices: tuple[Ints, ...]
     faces: tuple[Ints, ...]
+    #: Whether the file's content, with other texture coordinates, is that of the surfaces.
+    as_read: bool = True
+
+    @classmethod
+    def of(cls, parts: Sequence[SurfaceFile]) -> Shells:
+        """Return surfaces of a file that differ from its content, joined to one mesh."""
+        meshes = [part.mesh for part in parts]
+        starts = np.cumsum([0, *(mesh.n for mesh in meshes)])
+        F = [mesh.F + k for mesh, k in zip(meshes, starts, strict=False)]
+        vertices = [np.arange(a, b) for a, b in pairwise(starts)]
+        faces = [np.arange(a, b) for a, b in pairwise(np.cumsum([0, *map(len, F)]))]
+        V, joined = np.concatenate([mesh.V for mesh in meshes]), np.concatenate(F)
+        places = tuple(vertices), tuple(faces)
+        return cls(parts[0].path, V, joined, tuple(parts), *places, as_read=False)
 
     def joined(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
         """Return the images of all surfaces as one array, per corner where surfaces were cut.
@@ -145,7 +160,7 @@ def read_shells(
 def _alone(file: SurfaceFile) -> Shells:
     mesh = file.uncut or file.mesh
     every = (np.arange(mesh.n),), (np.arange(mesh.m),)
-    return Shells(file.path, mesh.V, mesh.F, (file,), *every)
+    return Shells(file.path, mesh.V, mesh.F, (file,), *every, as_read=file.repaired is None)
 
 
 def _split(soup: Soup) -> list[tuple[Ints, Ints]]:

@@ -51,6 +51,7 @@ def map_files(
     html: AnyPath | None = None,
     preview: bool = False,
     certificate: bool = False,
+    overlay: bool = False,
     keep_invalid: bool = False,
     overwrite: bool = False,
     repair: bool = False,
@@ -102,8 +103,12 @@ def map_files(
     preview : bool
         Draw a PNG beside the output; folded triangles are red.
     certificate : bool
-        Enclose the conformal modulus of each disk between four boundary points, or of a surface
-        with one hole, which a conformal map keeps, and compare the map's. Takes two solves.
+        Enclose the conformal modulus of each disk between four boundary points, or the capacities
+        of the holes, which a conformal map keeps, and compare the map's. Takes two solves, or two
+        for each hole.
+    overlay : bool
+        Map with cetm-flips, and write the mesh cut along the edges of its flipped triangulation: a
+        refinement of the surface, with more triangles, on which the map has no folds.
     keep_invalid : bool
         Write invalid maps too.
     overwrite : bool
@@ -139,7 +144,8 @@ def map_files(
     MeshError
         A file cannot be read, or its surface is not of a kind that the algorithm takes.
     ParameterError
-        Options exclude each other, or a file would be overwritten.
+        Options exclude each other, a file would be overwritten, or there is no `overlay` of the
+        algorithm.
     RegistryError
         The algorithm is unknown.
 
@@ -158,6 +164,7 @@ def map_files(
     from cembench.api.components import read_shells
     from cembench.api.map_outputs import (
         check_options,
+        check_overlay_options,
         check_shells,
         check_takes_disks,
         output_files,
@@ -176,6 +183,11 @@ def map_files(
     settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
     registry = registry_with(plugins, reporter)
     candidates = [registry.algorithm(name) for name in algorithms_named(algorithm)]
+    apart = timeout != Options.timeout or memory_bytes is not None
+    if overlay:
+        check_overlay_options(
+            candidates, cut=cut, bake=bake is not None, apart=apart, threads=threads
+        )
     if cut:
         check_takes_disks(candidates)
     given, target = [Path(mesh) for mesh in meshes], path_of(output)
@@ -224,5 +236,6 @@ def map_files(
         *(files, options, file_options, together, reporter),
         keep_invalid=keep_invalid,
         certificate=certificate,
-        apart=timeout != Options.timeout or memory_bytes is not None,
+        overlay=overlay,
+        apart=apart,
     )

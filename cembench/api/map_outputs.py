@@ -10,18 +10,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
-from cembench.api.write_maps import FileOptions, joined, save_map
+from cembench.api.write_maps import FileOptions, save_map
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
 from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
-from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
 from cembench.results.records import Record
+from cembench.running.measure import refinement_of
 
 
 def write_extras(
@@ -116,6 +116,29 @@ def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
         )
 
 
+def check_overlay_options(
+    candidates: Sequence[Algorithm], *, cut: bool, bake: bool, apart: bool, threads: int
+) -> None:
+    """Raise :class:`ParameterError` for what a map on a refined mesh does not go with."""
+    refinement_of(candidates[0])
+    if cut:
+        raise ParameterError.about(
+            "{overlay} refines both banks of a cut in different places, so the surface cannot be "
+            "written uncut: leave out {cut}, and map what {command} writes.",
+            command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
+        )
+    if bake:
+        raise ParameterError.about(
+            "{overlay} makes triangles that the texture's own UVs do not know: leave out {bake}, "
+            "and use {checker}."
+        )
+    if apart or threads > 1:
+        raise ParameterError.about(
+            "{overlay} maps in this process, with one thread and no limits: leave out {timeout}, "
+            "{memory_bytes} and {threads}."
+        )
+
+
 def picture_files(
     sources: Sequence[Path],
     chosen: Sequence[Algorithm],
@@ -207,11 +230,7 @@ def draw_maps(
         write_preview(shells.parts[0].mesh, maps[0], picture, title=title, caption=words)
         return
     moved = packed(maps, areas_of(shells.parts), equal=equal)
-    soups = [
-        Soup.of_triangles(part.mesh.V, part.mesh.F, z)
-        for part, z in zip(shells.parts, moved, strict=True)
-    ]
-    whole = joined(soups)
-    mesh = TriangleMesh.trusted(whole.V, whole.triangles, shells.path.stem)
+    joined = Shells.of(shells.parts)
+    mesh = TriangleMesh.trusted(joined.V, joined.F, shells.path.stem)
     title = f"{shells.path.stem}: {len(maps)} surfaces"
     write_preview(mesh, np.concatenate(moved), picture, title=title, turned=False)

@@ -19,7 +19,7 @@ from cembench.mesh import datasets
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry
 from cembench.results.records import Record
-from cembench.running.in_this_process import map_here, may_run_here
+from cembench.running.in_this_process import map_here, may_run_here, overlay_here
 from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.surfaces import SurfaceFile, file_named, is_generated
@@ -65,6 +65,8 @@ class Mapped:
     told: Told = ()
     #: What the bounds of the surface's modulus say of the map, if that was asked for.
     certificate: str = ""
+    #: What the refined mesh is that the map is on, if that was asked for.
+    overlay: str = ""
 
     @property
     def ok(self) -> bool:
@@ -122,6 +124,8 @@ class Maps:
     reporter: Reporter = SILENT
     keep_invalid: bool = False
     certificate: bool = False
+    #: Whether each map is on the algorithm's refinement of the surface, which is then written.
+    overlay: bool = False
     #: Whether each surface is mapped in a process of its own, which keeps the limits.
     apart: bool = True
     done: list[Mapped] = field(default_factory=list)
@@ -160,26 +164,30 @@ class Maps:
     def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
         told: tuple[Notice, ...] = ()
         maps = self._maps(own, file.output)
+        shells = Shells.of([m.surface for m in own]) if self.overlay else file.shells
         if maps and file.output is not None:
             atlas = own[0].record.target == "atlas"
-            told = write_shells(file.output, file.shells, maps, self.file_options, atlas=atlas)
+            told = write_shells(file.output, shells, maps, self.file_options, atlas=atlas)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
                 equal = self.file_options.equal
-                draw_maps(file.shells, maps, file.picture, own[0].record, equal=equal)
+                draw_maps(shells, maps, file.picture, own[0].record, equal=equal)
         return tuple((file.output or file.shells.path, notice) for notice in told)
 
     def _mapped(self, file: FileJobs, surface: SurfaceFile, task: Task) -> Mapped:
-        mesh, algorithm = surface.mesh, task.algorithm
+        mesh, algorithm, words = surface.mesh, task.algorithm, ""
         with self.reporter.busy(f"{algorithm.title} on {mesh.name}, {mesh.m:,} triangles"):
-            if self.apart or not may_run_here(task):
+            if self.overlay:
+                record, mesh, uv = overlay_here(task)
+                surface, words = replace(surface, mesh=mesh), _overlay(mesh, surface.mesh)
+            elif self.apart or not may_run_here(task):
                 from cembench.running.local import map_once
 
                 record, uv = map_once(task, self.options)
             else:
                 record, uv = map_here(task)
         proof = _certificate(mesh, uv, record) if self.certificate and uv is not None else ""
-        mapped = Mapped(surface, record, uv, {}, certificate=proof)
+        mapped = Mapped(surface, record, uv, {}, certificate=proof, overlay=words)
         if uv is None or not self.writes(mapped):
             return mapped
         told: Told = ()
@@ -193,12 +201,20 @@ class Maps:
         return replace(mapped, written=written, told=told)
 
 
+def _overlay(fine: TriangleMesh, given: TriangleMesh) -> str:
+    """Return what a refined mesh is."""
+    return (
+        f"{fine.m:,} triangles, the {given.m:,} of {given.name} cut along the edges of the flipped "
+        "triangulation; the map and the files written are of this refined mesh"
+    )
+
+
 def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
     """Return what the bounds of the surface's modulus say of a map."""
     from cembench.conformal.certificate import certificate_of
 
     try:
         found = certificate_of(mesh, uv, record.target)
+        return "only for maps to the disk" if found is None else found.words(uv[found.corners])
     except AlgorithmFailed as error:
         return f"none: {error}"
-    return "only for maps to the disk" if found is None else found.words(uv[found.corners])

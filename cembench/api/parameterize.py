@@ -7,7 +7,7 @@ import html
 import os
 import warnings
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -21,21 +21,19 @@ from cembench.api.settings import Placement
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
-from cembench.core.parameterization import Parameterization
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
-from cembench.results.records import Cell, Outcome
-from cembench.running.map_checks import figures, judged_check
-from cembench.running.map_promises import Promise
-from cembench.running.measure import call_cell, check_cell
+from cembench.results.records import Outcome
+from cembench.running.map_checks import figures
+from cembench.running.measure import check_cell, check_overlay, refinement_of
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import SurfaceInput, load_surface
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cembench.conformal.certificate import Certificate
+    from cembench.conformal.certificate import Certificate, HolesCertificate
 
 #: How thoroughly a map is checked.
 Check = Literal["full", "fast"]
@@ -171,17 +169,17 @@ class Result:
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
 
-    def certificate(self) -> Certificate:
+    def certificate(self) -> Certificate | HolesCertificate:
         """Enclose the conformal modulus of the surface, which the map should have.
 
-        Four boundary points make a disk a quadrilateral; a surface with one hole has a modulus of
-        its own. Two harmonic functions enclose it from both sides without a known map, and every
-        conformal map keeps it. A map whose modulus is outside is not conformal; one within may
-        still be wrong elsewhere.
+        Four boundary points make a disk a quadrilateral, whose modulus two harmonic functions
+        enclose from both sides without a known map; a surface with holes has their capacities,
+        enclosed by two functions for each hole. Every conformal map keeps both. A map whose modulus
+        or circles are outside is not conformal; one within may still be wrong elsewhere.
 
         Returns
         -------
-        Certificate
+        Certificate or HolesCertificate
             The bounds; ``words(result.z[certificate.corners])`` compares the map with them.
 
         Raises
@@ -189,7 +187,7 @@ class Result:
         ParameterError
             The map is not one to the disk.
         AlgorithmFailed
-            The boundary has fewer than four vertices, or the surface several holes.
+            The boundary has fewer than four vertices.
 
         Examples
         --------
@@ -450,32 +448,10 @@ def parameterize(
     task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
     full = check == "full"
     if overlay:
-        outcome, mesh, z = _refined(chosen, task.mesh, task.cell, full)
+        refinement_of(chosen)
+        outcome, mesh, z = check_overlay(chosen, task.mesh, task.cell, figures=full)
     else:
         outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)
-
-
-def _refined(
-    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, full: bool
-) -> tuple[Outcome, TriangleMesh, NDArray[np.complex128] | None]:
-    """Map a surface by an algorithm's refinement; return the outcome, that mesh and its map."""
-    refinement = algorithm.refinement
-    if refinement is None:
-        raise ParameterError(
-            f"{algorithm.name} has no overlay: its map is on the surface's own triangles. Use "
-            "cetm-flips."
-        )
-    kept: list[Any] = []
-
-    def at_given_vertices(mesh: TriangleMesh, **parameters: Any) -> Parameterization:
-        kept.append(refinement(mesh, **parameters))
-        return Parameterization(kept[-1].uv[: mesh.n].copy(), extras=kept[-1].extras)
-
-    called, z = call_cell(replace(algorithm, function=at_given_vertices), mesh, cell, memory=False)
-    if z is None:
-        return called, mesh, None
-    fine, uv = kept[-1].mesh, kept[-1].uv
-    return judged_check(Promise.of(algorithm), fine, called, uv, figures=full), fine, uv

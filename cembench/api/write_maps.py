@@ -182,7 +182,7 @@ def _save(
 
 def _obj_text(soup: Soup, source: Shells | None) -> str:
     """Return an OBJ file: that of the source with other coordinates, or a new one."""
-    if source is None or source.path.suffix.lower() != ".obj" or source.parts[0].repaired:
+    if source is None or source.path.suffix.lower() != ".obj" or not source.as_read:
         return obj.write(soup).decode()
     text = source.path.read_text(encoding="latin-1")  # any bytes, as they are
     per_corner = any(part.cut for part in source.parts)
@@ -200,7 +200,7 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | No
         return checker_png()
     from cembench.drawing.texture import baked_png, read_texture
 
-    if source is None or source.parts[0].repaired:
+    if source is None or not source.as_read:
         raise ParameterError.about(
             "{bake} needs the faces of the original file, but the surface was repaired, or is not "
             "of a file; {repair} shows what it changes. Fix the file so that it keeps its UVs.",

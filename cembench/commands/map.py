@@ -88,7 +88,8 @@ def _failure(mapped: Mapped, *, named: bool) -> str:
 def _more_of(mapped: Mapped) -> dict[str, Any]:
     repaired = mapped.surface.repaired
     proof = {"certificate": mapped.certificate} if mapped.certificate else {}
-    return proof | ({"repair": repaired.counts} if repaired else {})
+    refined = {"overlay": mapped.overlay} if mapped.overlay else {}
+    return proof | refined | ({"repair": repaired.counts} if repaired else {})
 
 
 def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
@@ -96,6 +97,8 @@ def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
     from cembench.report.record_table import figures_table
 
     out.print(figures_table(mapped.record, full=verbose))
+    if mapped.overlay:
+        print_pair("overlay", mapped.overlay)
     if mapped.certificate:
         print_pair("modulus", mapped.certificate)
     for what, where in mapped.written.items():

@@ -10,19 +10,12 @@ Computational Conformal Geometry, harmonic 1-forms).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
+from cembench.conformal.conjugate_functions import ConjugateFunctions, conjugate_functions
 from cembench.conformal.folds import in_order
-from cembench.conformal.harmonic import HarmonicExtension
-from cembench.conformal.laplacian import laplacian
-from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-from cembench.linear_algebra.cholesky import Cholesky
-from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.triangle_mesh import HoledMesh
 
 Complex = NDArray[np.complex128]
@@ -66,16 +59,16 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     True
 
     """
-    ring = conjugate_pair(mesh, outer, hole)
-    u, v, b = ring.u, ring.v, np.concatenate([outer, hole])
-    lifted, paths = v[ring.cut.origin] + ring.jump, ring.paths
+    ring = conjugate_functions(mesh, outer, [hole])
+    u, v, b = ring.u[:, 0], ring.v[:, 0], np.concatenate([outer, hole])
+    lifted, paths = v[ring.cut.origin] + ring.jump[:, 0], _rims(ring, outer, hole)
     goals = _increasing(lifted[paths[0]]), -_increasing(-lifted[paths[1]])
     moved = np.concatenate(goals) - np.concatenate([lifted[path[:-1]] for path in paths])
     if np.abs(moved).max() > 0:
         by_vertex = np.zeros(mesh.n)
         by_vertex[np.concatenate([ring.cut.origin[path[:-1]] for path in paths])] = moved
         v = v + ring.extension(by_vertex[b])
-    modulus = 2 * np.pi / ring.capacity
+    modulus = 2 * np.pi / float(ring.capacity[0, 0])
     if not modulus < DEEPEST:
         raise AlgorithmFailed(
             f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
@@ -85,80 +78,11 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     return image
 
 
-@dataclass(frozen=True)
-class ConjugatePair:
-    """A harmonic function on a surface with one hole, and its conjugate.
-
-    Parameters
-    ----------
-    u : float (n,)
-        0 on the outer boundary, 1 on the hole.
-    v : float (n,)
-        With `jump` added on the cut surface, an angle that grows by 2 pi around the hole.
-    cut : Cut
-        The surface cut open between its boundaries.
-    jump : float (n',)
-        2 pi on one bank of the cut, else 0.
-    paths : tuple of int64 arrays
-        Both boundaries on the cut surface, from one bank to the other.
-    extension : HarmonicExtension
-        Of values on both boundaries, the outer one first.
-    capacity, circulation : float
-        The Dirichlet energies of both: upper bounds of 2 pi / h and 2 pi h for the annulus with
-        radii 1 and exp(-h).
-
-    """
-
-    u: NDArray[np.float64]
-    v: NDArray[np.float64]
-    cut: Cut
-    jump: NDArray[np.float64]
-    paths: tuple[Loop, Loop]
-    extension: HarmonicExtension
-    capacity: float
-    circulation: float
-
-
-def conjugate_pair(mesh: HoledMesh, outer: Loop, hole: Loop) -> ConjugatePair:
-    """Return the potential between both boundaries, and its conjugate; as :func:`annulus_map`."""
-    with phase("boundary"):
-        cut = cut_open(mesh)
-        paths = _rims(cut, outer, hole)
-        jump = 2 * np.pi * _bank(cut, paths)
-    L_cut = laplacian(cut.mesh, delaunay=True)
-    with phase("assembly"):
-        copies = np.arange(cut.mesh.n)
-        glue = scipy.sparse.csr_array((np.ones(len(copies)), (copies, cut.origin)))
-        L = scipy.sparse.csc_array(glue.T @ L_cut @ glue)
-        b = np.concatenate([outer, hole])
-        on_hole = np.repeat([0.0, 1.0], [len(outer), len(hole)])
-        others = np.delete(np.arange(mesh.n), outer[0])
-    extension = HarmonicExtension(L, b)
-    u = extension(on_hole)
-    v = np.zeros(mesh.n)
-    v[others] = Cholesky(L[others][:, others]).solve(-(glue.T @ (L_cut @ jump))[others])
-    lifted = v[cut.origin] + jump
-    energies = float(u @ (L @ u)), float(lifted @ (L_cut @ lifted))
-    return ConjugatePair(u, v, cut, jump, paths, extension, *energies)
-
-
-def _rims(cut: Cut, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:
+def _rims(pair: ConjugateFunctions, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:
     """Return the boundaries on a cut annulus, each from one bank of the cut to the other."""
-    b = cut.mesh.boundary
-    on_outer = np.isin(cut.origin[b], outer)
-    begins = int(np.flatnonzero(on_outer & ~np.roll(on_outer, 1))[0])
-    b = np.roll(b, -begins)
-    on_hole = np.flatnonzero(np.isin(cut.origin[b], hole))
+    b = pair.boundary
+    on_hole = np.flatnonzero(np.isin(pair.cut.origin[b], hole))
     return b[: len(outer) + 1], b[on_hole[0] : on_hole[0] + len(hole) + 1]
-
-
-def _bank(cut: Cut, paths: tuple[Loop, Loop]) -> NDArray[np.float64]:
-    """Return 1 for the vertices of a cut annulus on the bank after a turn, 0 for all others."""
-    b = cut.mesh.boundary
-    b = np.roll(b, -int(np.flatnonzero(b == paths[0][-1])[0]))
-    after = np.zeros(cut.mesh.n)
-    after[b[: int(np.flatnonzero(b == paths[1][0])[0]) + 1]] = 1
-    return after
 
 
 def _increasing(angles: NDArray[np.float64]) -> NDArray[np.float64]:

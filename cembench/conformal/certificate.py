@@ -4,7 +4,8 @@ Four boundary points make a surface a quadrilateral. Its modulus is the Dirichle
 potential that is 0 on one side and 1 on the opposite side; that of the other pair of sides is the
 reciprocal. Linear elements approximate each from above, so both together enclose the modulus of the
 polyhedral surface, and their product exceeds 1 by the discretisation error (Hakula, Rasila &
-Vuorinen 2011). A conformal map preserves the modulus, which is known exactly in the disk.
+Vuorinen 2011). A conformal map preserves the modulus, which is known exactly in the disk. For a
+surface with holes the same two principles enclose the matrix of its capacities.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from cembench.conformal.annulus import conjugate_pair
+from cembench.conformal.circle_capacities import circle_capacities
+from cembench.conformal.conjugate_functions import conjugate_functions
 from cembench.conformal.harmonic import edge_lengths, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import fitted_circle, polygon_area
@@ -91,65 +93,148 @@ class Certificate:
 
 
 @dataclass(frozen=True)
-class RingCertificate(Certificate):
-    """The modulus of a surface with one hole, with bounds: log(1 / r) / 2 pi if that has radius r.
+class HolesCertificate:
+    """The capacities of the holes of a surface, with bounds.
 
-    `corners` are the vertices of the hole, `upper` and `conjugate` come from the angle around it
-    and from the potential between the boundaries.
+    Capacity C_ij is the integral of the product of the gradients of the harmonic functions that are
+    1 on hole i, or j, and 0 on all other boundaries; C = 2 pi / log(1 / r) for one round hole of
+    radius r in the middle of the unit disk. Conformal maps keep C, and a K-quasiconformal one
+    changes a^T C a, for any a, by at most the factor K. C determines the domain up to conformal
+    maps: it is the period matrix of its double (Torelli's theorem).
+
+    Parameters
+    ----------
+    corners : int64 (b,)
+        The vertices of all holes, one hole after another.
+    sizes : tuple of int
+        The number of vertices of each.
+    upper : float (k, k)
+        Energies of linear elements: a^T upper a >= a^T C a (Dirichlet's principle).
+    conjugate : float (k, k)
+        Those of the conjugate functions, of period 1: a^T conjugate a >= a^T C^-1 a (Thomson's
+        principle), so the inverse is a lower bound.
+
     """
 
-    def of_map(self, z: Complex) -> float:
-        """Return the modulus of the unit disk without the circle through z (k,)."""
-        centre, radius = fitted_circle(z)
-        wide = (1 + radius**2 - abs(centre) ** 2) / (2 * radius)
-        return float(np.arccosh(wide) / (2 * np.pi)) if wide >= 1 else float("nan")
+    corners: NDArray[np.int64]
+    sizes: tuple[int, ...]
+    upper: NDArray[np.float64]
+    conjugate: NDArray[np.float64]
+
+    @property
+    def lower(self) -> NDArray[np.float64]:
+        """A lower bound of the capacities (k, k), as a quadratic form."""
+        return np.asarray(np.linalg.inv(self.conjugate), dtype=np.float64)
+
+    @property
+    def reciprocal_error(self) -> float:
+        """The largest ratio of both bounds, less 1: the discretisation error."""
+        return _largest_ratio(self.upper, self.lower) - 1
+
+    def of_map(self, z: Complex) -> tuple[NDArray[np.float64], float]:
+        """Return the capacities (k, k) of the unit disk without the circles of a map, and their
+        error; z (b,) are the images of `corners`.
+
+        Raises
+        ------
+        AlgorithmFailed
+            The image of a hole is not a circle to :data:`ROUND`, or circles meet.
+
+        """
+        loops = np.split(z, np.cumsum(self.sizes)[:-1])
+        centres, radii = map(np.array, zip(*map(fitted_circle, loops), strict=True))
+        for loop, centre, radius, k in zip(loops, centres, radii, range(len(radii)), strict=True):
+            off = float(np.abs(np.abs(loop - centre) / radius - 1).max())
+            if not off < ROUND:
+                vertex = self.corners[sum(self.sizes[:k])]
+                raise AlgorithmFailed(
+                    f"the image of the hole with vertex {vertex} is off a circle by {off:.1g} of "
+                    "its radius, and only capacities of circles are known; direct-cem-holes makes "
+                    "circles"
+                )
+        return circle_capacities(centres, radii)
+
+    def off(self, z: Complex) -> tuple[float, float]:
+        """Return by how much the capacities of a map's circles differ, at least and at most.
+
+        Let r be the largest of a^T C' a / a^T C a and its inverse over all a, for the circles' C'
+        and the surface's C; r - 1 is in this interval. Every map of the surface to these circles
+        has a dilatation K of at least r somewhere. z (b,) as in :meth:`of_map`.
+        """
+        own, error = self.of_map(z)
+        least = max(_largest_ratio(own, self.upper), _largest_ratio(self.lower, own))
+        most = max(_largest_ratio(own, self.lower), _largest_ratio(self.upper, own))
+        error *= len(self.sizes)
+        return max(least - 1 - error, 0.0), most - 1 + error
+
+    def encloses(self, z: Complex) -> bool:
+        """Whether the map's circles, with z as in :meth:`of_map`, may be the surface's."""
+        return self.off(z)[0] == 0
 
     def words(self, z: Complex) -> str:
-        """Return what the bounds say; the circle is that of the polygon's vertices, a bit large."""
-        return super().words(z).removesuffix(", outside")
+        """Return what the bounds say of a map; z (b,) as in :meth:`of_map`."""
+        least, most = self.off(z)
+        about = "the capacities of the holes and of the map's circles differ by"
+        if least == 0:
+            return (
+                f"{about} at most {most:.2%}, within the bounds: these circles may be the "
+                "surface's; angle errors tell of the map between them"
+            )
+        return (
+            f"{about} {least:.2%} to {most:.2%}, outside the bounds: no map of this mesh to these "
+            "circles is conformal"
+        )
 
 
-def certificate_of(mesh: TriangleMesh, z: Complex, target: str) -> Certificate | None:
+#: How far the image of a hole may be off a circle, as a share of the radius.
+ROUND = 1e-6
+
+
+def _largest_ratio(A: NDArray[np.float64], B: NDArray[np.float64]) -> float:
+    """Return the largest a^T A a / a^T B a of two symmetric matrices, the second one positive."""
+    from scipy.linalg import eigh  # imported here: rarely needed
+
+    return float(eigh(A, B, eigvals_only=True)[-1])
+
+
+def certificate_of(
+    mesh: TriangleMesh, z: Complex, target: str
+) -> Certificate | HolesCertificate | None:
     """Return the bounds for a map z (n,) of this target; None if it is not one with bounds.
 
     Raises
     ------
     AlgorithmFailed
-        The boundary has fewer than four vertices, or there are several holes.
+        The boundary has fewer than four vertices.
 
     """
     if target == "disk" and isinstance(mesh, DiskMesh):
         return certify(mesh)
     if target == "circular holes" and isinstance(mesh, HoledMesh):
-        return certify_ring(mesh, int(max(mesh.loops, key=lambda loop: polygon_area(z[loop]))[0]))
+        outer = max(mesh.loops, key=lambda loop: polygon_area(z[loop]))
+        return certify_holes(mesh, int(outer[0]))
     return None
 
 
-def certify_ring(mesh: HoledMesh, outer: int | None = None) -> RingCertificate:
-    """Enclose the modulus of a surface with one hole by two conjugate harmonic functions.
+def certify_holes(mesh: HoledMesh, outer: int | None = None) -> HolesCertificate:
+    """Enclose the capacities of a surface with holes by harmonic functions and their conjugates.
 
     `outer` is a vertex of the outer boundary (default: of the widest).
-
-    Raises
-    ------
-    AlgorithmFailed
-        The surface has more than one hole.
 
     Examples
     --------
     >>> import cembench
-    >>> found = certify_ring(cembench.surface("catenoid-ring", 2000))
-    >>> found.lower < found.upper, abs(2 * np.pi * found.modulus - 1) < 1e-3
+    >>> found = certify_holes(cembench.surface("catenoid-ring", 2000))
+    >>> low, high = found.lower[0, 0], found.upper[0, 0]
+    >>> bool(low < high < 1.01 * low), bool(abs(high / (2 * np.pi) - 1) < 1e-2)
     (True, True)
 
     """
     boundary, holes = mesh.outer_and_holes(outer)
-    if len(holes) != 1:
-        raise AlgorithmFailed(
-            f"{mesh.name} has {len(holes)} holes; bounds are known for a disk or one hole"
-        )
-    pair = conjugate_pair(mesh, boundary, holes[0])
-    return RingCertificate(holes[0], pair.circulation / (4 * np.pi**2), pair.capacity)
+    pair = conjugate_functions(mesh, boundary, holes)
+    sizes = tuple(map(len, holes))
+    periods = pair.circulation / (4 * np.pi**2)
+    return HolesCertificate(np.concatenate(holes), sizes, pair.capacity, periods)
 
 
 def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certificate:

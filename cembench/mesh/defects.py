@@ -157,17 +157,17 @@ def _remedies_in_shell(problems: Sequence[Problem], path: Path | None) -> str:
     mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
     fill = f" --fill-holes {max(p.edges for p in problems)}" if Remedy.fill in needed else ""
     advice = [_RESCALE] if Remedy.rescale in needed else []
-    if Remedy.repair in needed:
+    if Remedy.repair in needed or fill:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
-        advice.append(
-            f"`cembench repair {source} -o {mended}` {does}, or add --repair to map or run."
+        does = "fills the holes" if Remedy.repair not in needed else does
+        only = f"without{fill.rpartition(' ')[0]}, " if fill and Remedy.repair in needed else ""
+        other = (
+            f"{only}use an algorithm for surfaces with holes (see `cembench list algorithms`)"
+            if fill
+            else "add --repair to map or run"
         )
+        advice.append(f"`cembench repair {source} -o {mended}{fill}` {does}, or {other}.")
         source = mended
-    if fill:
-        advice.append(
-            f"`cembench repair {source} -o {mended}{fill}` fills the holes; or use an algorithm "
-            "for surfaces with holes (see `cembench list algorithms`)."
-        )
     if Remedy.cut in needed:
         cut = "OUT" if path is None else f"{shlex.quote(path.stem + '_cut')}.obj"
         advice.append(

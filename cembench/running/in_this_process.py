@@ -7,15 +7,18 @@ own are for what is compared, for plug-ins and programs, and where a limit has t
 from __future__ import annotations
 
 import importlib
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import psutil
 from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Record
 from cembench.running.environment import describe_environment
-from cembench.running.measure import check_cell
+from cembench.running.measure import check_cell, check_overlay
 from cembench.running.plan import Task
 from cembench.running.recorder import now, record_of
 from cembench.running.usual_costs import ROUGH_BYTES_A_FACE
@@ -39,9 +42,19 @@ def may_run_here(task: Task) -> bool:
 
 def map_here(task: Task) -> tuple[Record, NDArray[np.complex128] | None]:
     """Call once in this process, and keep nothing on disk; see :func:`local.map_once`."""
+    return _recorded(task, check_cell)
+
+
+def overlay_here(task: Task) -> tuple[Record, TriangleMesh, NDArray[np.complex128] | None]:
+    """Map a surface on the algorithm's refinement of it, in this process; also return that."""
+    return _recorded(task, check_overlay)
+
+
+def _recorded(task: Task, check: Callable[..., tuple[Any, ...]]) -> tuple[Any, ...]:
+    """Return the record of a checked call, with what else the check returns."""
     started = now()
     for name in _CALLED:  # else the call would load them
         importlib.import_module(name)
     with threadpool_limits(limits=1):
-        outcome, uv = check_cell(task.algorithm, task.mesh, task.cell)
-    return record_of(task, outcome, describe_environment()["id"], started), uv
+        outcome, *found = check(task.algorithm, task.mesh, task.cell)
+    return record_of(task, outcome, describe_environment()["id"], started), *found

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from cembench.core.clock import Timing, measure
 from cembench.core.errors import NotThere, ParameterError
+from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.linear_algebra.work import Work, counting
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -179,6 +180,48 @@ def check_cell(
     if uv is None:
         return called, None
     return judged_check(Promise.of(algorithm), mesh, called, uv, figures=figures), uv
+
+
+def check_overlay(
+    algorithm: Algorithm, mesh: TriangleMesh, cell: Cell, *, figures: bool = True
+) -> tuple[Outcome, TriangleMesh, Complex | None]:
+    """Call an algorithm's refinement once, like :func:`check_cell`; also return the refined mesh.
+
+    Its map is judged on the refined mesh. Without a map, the mesh is the given one.
+    """
+    kept: list[Any] = []
+
+    def at_given_vertices(mesh: TriangleMesh, **parameters: Any) -> Parameterization:
+        kept.append(refinement_of(algorithm)(mesh, **parameters))
+        return Parameterization(kept[-1].uv[: mesh.n].copy(), extras=kept[-1].extras)
+
+    with _raised_by_signals() as raised:
+        here = replace(algorithm, function=at_given_vertices)
+        called, z = call_cell(here, mesh, cell, memory=False)
+    if raised:
+        raise raised[0]
+    if z is None:
+        return called, mesh, None
+    fine, uv = kept[0].mesh, kept[0].uv
+    return judged_check(Promise.of(algorithm), fine, called, uv, figures=figures), fine, uv
+
+
+def refinement_of(algorithm: Algorithm) -> Callable[..., Any]:
+    """Return what maps a surface on a refinement of it.
+
+    Raises
+    ------
+    ParameterError
+        The algorithm has no such map.
+
+    """
+    if algorithm.refinement is None:
+        raise ParameterError.about(
+            "{name} has no {overlay}, its map is on the surface's own triangles; use "
+            "{algorithm:'cetm-flips'}.",
+            name=algorithm.name,
+        )
+    return algorithm.refinement
 
 
 @contextmanager

@@ -205,6 +205,14 @@ def test_a_crowded_rim_falls_back_to_its_own_polygon():
     np.testing.assert_allclose(koebe._patch(rim, "disks"), koebe.fan_patch(rim))
 
 
+def test_rims_whose_disks_have_no_positive_energy_are_filled_by_their_own_polygons(monkeypatch):
+    mesh = gallery.three_holes(600)
+    own = koebe_cem(mesh, patches="fans").uv
+    assert np.abs(koebe_cem(mesh).uv - own).max() > 1e-6
+    monkeypatch.setattr(koebe, "disk_patch", lambda angles: -1e9 * np.eye(len(angles)))
+    np.testing.assert_allclose(koebe_cem(mesh).uv, own, atol=1e-12)
+
+
 @pytest.mark.parametrize("name", REAL)
 def test_real_surfaces_map_without_folds_and_with_round_holes(name):
     mesh = read_mesh(real_mesh(f"holes/{name}"), HoledMesh)

@@ -1,6 +1,8 @@
 """What people take home of a map, as the command line and `Result` write it."""
 
 import io
+import json
+import re
 
 import numpy as np
 import OpenEXR
@@ -225,3 +227,65 @@ def test_exr_says_what_it_needs(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "OpenEXR", None)
     with pytest.raises(cembench.RenderError, match=r"pip install 'cembench\[formats\]'"):
         geometry_images.check_image_format(tmp_path / "a.exr")
+
+
+@pytest.fixture
+def bumpy(tmp_path):
+    """A rough stretched rectangle in a file, many of whose edges are flipped."""
+    V, F = gallery.flat_rectangle(8, 14)
+    V[:, 0] *= 3
+    V[:, 2] = 2 * np.random.default_rng(3).standard_normal(len(V))
+    write_mesh(tmp_path / "bumpy.obj", cembench.DiskMesh.from_arrays(V, F))
+    return tmp_path / "bumpy.obj"
+
+
+def test_an_overlay_is_written_as_the_refined_mesh(cli, bumpy):
+    options = ("-a", "cetm-flips", "--overlay", "-o", "fine.obj", "--preview")
+    code, out, err = cli("map", bumpy, *options)
+    assert code == 0, err
+    given, fine = read_mesh(bumpy), read_mesh(cli.folder / "fine.obj")
+    assert f"{fine.m:,} triangles, the {given.m:,} of bumpy cut along" in " ".join(out.split())
+    np.testing.assert_allclose(fine.V[: given.n], given.V)
+    uv = uv_of(cli.folder / "fine.obj")
+    result = cembench.parameterize(bumpy, "cetm-flips", overlay=True)
+    np.testing.assert_allclose(uv, (result.uv + 1) / 2, atol=1e-7)
+    assert (cli.folder / "fine.png").exists()
+    code, out, _ = cli("map", bumpy, "-a", "cetm-flips", "--overlay", "--json")
+    assert code == 0
+    assert "flipped triangulation" in json.loads(out)["overlay"]
+
+
+def test_overlays_of_several_surfaces_go_to_one_file_or_to_several(cli, bumpy, given):
+    for output in ("all.obj", "maps"):
+        call = ("map", bumpy, given, "-a", "cetm-flips", "--overlay", "-o", output)
+        code, _, err = cli(*call)
+        assert code == 0, err
+    fine = [read_mesh(cli.folder / "maps" / name).m for name in ("bumpy.obj", "flat.obj")]
+    assert fine[0] > read_mesh(bumpy).m
+    together = trimesh.load_mesh(cli.folder / "all.obj", process=False)
+    assert len(together.faces) == sum(fine)
+    both = cli.folder / "both.obj"  # without UVs, in one file, whose overlay is written
+    trimesh.util.concatenate([trimesh.load_mesh(bumpy), trimesh.load_mesh(given)]).export(both)
+    code, _, err = cli("map", both, "-a", "cetm-flips", "--overlay", "-o", "again.obj")
+    assert code == 0, err
+    again = trimesh.load_mesh(cli.folder / "again.obj", process=False)
+    assert len(again.faces) == sum(fine)
+    np.testing.assert_allclose(np.sort(again.area_faces), np.sort(together.area_faces), rtol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "remedy"),
+    [
+        ((), "direct-cem has no --overlay, .* use -a cetm-flips"),
+        (("-a", "cem"), "cem has no --overlay, .* use -a cetm-flips"),
+        (("-a", "cetm-flips", "--cut"), "leave out --cut, and map what `cembench cut"),
+        (("-a", "cetm-flips", "--bake", "paint.png", "-o", "x.obj"), "leave out --bake"),
+        (("-a", "cetm-flips", "--timeout", "5"), "leave out --timeout, --memory and --threads"),
+        (("-a", "cetm-flips", "--threads", "2"), "leave out --timeout, --memory and --threads"),
+    ],
+)
+def test_an_overlay_says_what_it_does_not_go_with(cli, bumpy, options, remedy):
+    code, _, err = cli("map", bumpy, "--overlay", *options)
+    assert code == 2
+    assert re.search(remedy, " ".join(err.split())), err
+    assert not (cli.folder / "x.obj").exists()

@@ -10,8 +10,9 @@ from cembench.surfaces.spherical_cap import spherical_cap
 from scipy import integrate
 
 import cembench
-from cembench import DiskMesh
-from cembench.conformal.certificate import certify, certify_ring, disk_modulus, four_points
+from cembench import DiskMesh, HoledMesh
+from cembench.conformal.certificate import certify, certify_holes, disk_modulus, four_points
+from cembench.conformal.circle_capacities import circle_capacities
 from cembench.conformal.moebius import Moebius
 from cembench.core.errors import AlgorithmFailed
 from tests import gallery
@@ -131,24 +132,94 @@ def test_the_four_points_follow_the_geometry_and_are_apart():
     assert certify(square, np.array([0, 1, 3, 2])).upper == pytest.approx(9)
 
 
-def test_a_ring_s_modulus_is_enclosed_and_the_bounds_close_at_second_order():
-    widths = []
+def test_the_capacity_of_a_ring_is_enclosed_and_the_bounds_close_at_second_order():
+    """Its map to the annulus has log(1 / r) = 2 pi / C = 1."""
+    widths, errors = [], []
     for faces in (500, 8000):
-        ring = cembench.surface("catenoid-ring", faces)
-        found = certify_ring(ring)
-        assert found.lower < found.upper
-        assert found.modulus == pytest.approx(1 / (2 * np.pi), rel=0.01)
+        found = certify_holes(cembench.surface("catenoid-ring", faces))
+        middle = np.sqrt(found.lower[0, 0] * found.upper[0, 0])
         widths.append(found.reciprocal_error)
-    assert np.log2(widths[0] / widths[1]) / 2 == pytest.approx(2, abs=0.3)
+        errors.append(abs(middle / (2 * np.pi) - 1))
+    for fell in (widths, errors):
+        assert fell[0] > 0
+        assert np.log2(fell[0] / fell[1]) / 2 == pytest.approx(2, abs=0.3)
 
 
-def test_a_ring_s_map_is_compared_whatever_its_centre_and_several_holes_have_no_bounds():
-    result = cembench.parameterize(cembench.surface("catenoid-ring", 2000))
+def test_bounds_of_several_holes_enclose_each_other_and_close():
+    """On finer meshes of the same domain both bounds move towards each other."""
+    V, F = gallery.disk_with_holes(*gallery.THREE_HOLES, 600)
+    coarse = certify_holes(HoledMesh.from_arrays(V, F))
+    fine = certify_holes(HoledMesh.from_arrays(*split(V, F)))
+    order = np.linalg.eigvalsh
+    assert order(coarse.upper - fine.upper).min() > -1e-12
+    assert order(fine.upper - fine.lower).min() > 0
+    assert order(fine.lower - coarse.lower).min() > -1e-12
+    assert fine.reciprocal_error < 0.5 * coarse.reciprocal_error
+
+
+def split(V, F):
+    """Split every triangle into four: another mesh of the same surface."""
+    edges = np.sort(np.concatenate([F[:, [1, 2]], F[:, [2, 0]], F[:, [0, 1]]]), axis=1)
+    ends, number = np.unique(edges, axis=0, return_inverse=True)
+    a, b, c = len(V) + number.reshape(3, -1)
+    i, j, k = F.T
+    parts = [(i, c, b), (c, j, a), (b, a, k), (a, b, c)]
+    fine = np.concatenate([np.stack(part, axis=1) for part in parts])
+    return np.concatenate([V, V[ends].mean(axis=1)]), fine
+
+
+@pytest.mark.parametrize("shift", [0.0, 0.03])
+def test_circles_that_are_not_the_surface_s_are_found_out(shift):
+    """A map that moves one hole of a plane domain keeps circles, but is not conformal."""
+    mesh = gallery.three_holes(5000)
+    found = certify_holes(mesh)
+    z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
+    centre, radius = (some[0] for some in gallery.THREE_HOLES)
+    far = np.abs(z - centre)
+    moved = z + shift * np.clip((radius + 0.15 - far) / 0.15, 0, 1)
+    least, most = found.off(moved[found.corners])
+    assert found.encloses(moved[found.corners]) == (shift == 0)
+    assert least <= most < 0.1 + 10 * shift
+    ending = "these circles may be" if shift == 0 else "to these circles is conformal"
+    assert ending in found.words(moved[found.corners])
+    # No smaller dilatation does: K of the shear is a bound that this bound does not exceed.
+    assert least < (1 + shift / 0.15) / (1 - shift / 0.15) - 1 + 1e-9
+
+
+def test_circles_are_compared_up_to_moebius_maps_and_polygons_are_refused():
+    result = cembench.parameterize(gallery.three_holes(1200))
     proof = result.certificate()
-    assert abs(proof.off(result.z[proof.corners])) < 0.005
-    assert "off" in proof.words(result.z[proof.corners])
-    circle = np.exp(2j * np.pi * np.arange(12) / 12)
-    moved = (0.4 * circle - 0.3) / (1 - 0.3 * 0.4 * circle)
-    assert proof.of_map(moved) == pytest.approx(proof.of_map(0.4 * circle))
-    with pytest.raises(AlgorithmFailed, match="3 holes"):
-        certify_ring(gallery.three_holes())
+    z = result.z[proof.corners]
+    moved = Moebius(1, -0.3j, 0.3j, 1)(z)
+    np.testing.assert_allclose(proof.off(moved), proof.off(z), atol=1e-7)
+    assert proof.encloses(z)
+    z[0] *= 1.01
+    with pytest.raises(AlgorithmFailed, match=r"hole with vertex \d+ is off a circle"):
+        proof.words(z)
+
+
+@pytest.mark.parametrize("radius", [0.5, 1e-200])
+def test_the_capacity_of_a_round_hole_is_known(radius):
+    C, error = circle_capacities(np.array([0j]), np.array([radius]))
+    assert C[0, 0] == pytest.approx(2 * np.pi / np.log(1 / radius), rel=1e-12)
+    assert error < 1e-12
+
+
+def test_equal_circles_around_the_middle_have_the_capacity_of_one_in_its_power():
+    """z -> z^n takes n discs about the roots of c to one preimage: with all at 1, n times as much.
+
+    For discs that are circles after the power, the sum of all capacities is n times that of the one
+    hole; small ones are, to first order in their radius.
+    """
+    n, r = 5, 1e-3
+    C, _ = circle_capacities(0.6 * np.exp(2j * np.pi * np.arange(n) / n), np.full(n, r))
+    one, _ = circle_capacities(np.array([0.6**n + 0j]), np.array([n * 0.6 ** (n - 1) * r]))
+    assert C.sum() == pytest.approx(n * one[0, 0], rel=1e-4)
+    np.testing.assert_allclose(C, np.roll(C, (1, 1), axis=(0, 1)), rtol=1e-7)
+    assert (C - np.diag(np.diag(C)) <= 0).all()
+
+
+def test_circles_that_meet_bound_no_domain():
+    for centres, radii in (([0.3, -0.3], [0.3, 0.31]), ([0.5], [0.5])):
+        with pytest.raises(AlgorithmFailed, match="circles of the map meet"):
+            circle_capacities(np.array(centres, complex), np.array(radii))

@@ -6,7 +6,7 @@ import pytest
 import cembench
 from cembench import DiskMesh, TriangleMesh
 from cembench.mesh.cut import cut_open
-from cembench.mesh.defects import Remedy, UnusableMeshError
+from cembench.mesh.defects import Defect, Remedy, UnusableMeshError
 from cembench.mesh.files import read_soup, repaired_soup, write_mesh
 from cembench.mesh.repair import repair
 from tests import gallery
@@ -83,9 +83,10 @@ def defective():
     yield "coincident", (V[F].reshape(-1, 3), np.arange(F.size).reshape(-1, 3))
     yield "degenerate", with_more(V, F, [V[0]], [[0, 1, n]])
     yield "duplicate", with_more(V, F, (), F[:1])
-    yield "edges", with_more(V, F, [[1, 1, 5]], [[F[4, 0], F[4, 1], n]])
+    yield "edges", with_more(V, F, [[1, 1, 5]], [[F[4, 0], F[4, 2], n]])
     yield "vertices", with_more(V, F, V[:2] - np.array([3, 3, 1]), [[0, n, n + 1]])
     yield "orientation", (V, np.concatenate([F[:3, ::-1], F[3:]]))
+    yield "one-sided", gallery.moebius_strip()
     yield "components", with_more(V, F, V[:3] + 9, [[n, n + 1, n + 2]])
     yield "isolated", with_more(V, F, [[7, 7, 7]])
     yield "holes", (V, np.delete(F, np.flatnonzero((F[13, 0] == F).any(axis=1)), axis=0))
@@ -94,6 +95,17 @@ def defective():
     yield "cut, and a fin", with_more(disk.V, disk.F, [[0, 0, 5]], [[*disk.F[2, :2], disk.n]])
     yield "cut twice as often", with_more(disk.V, disk.F, (), disk.F[:1])
     yield "crumpled", (hard_surface(3).V, hard_surface(3).F)
+
+
+def test_every_kind_of_defect_is_among_them():
+    """But for a surface without the hole that an algorithm needs."""
+    seen = set()
+    for _, (V, F) in defective():
+        try:
+            DiskMesh.from_arrays(V, F)
+        except UnusableMeshError as error:
+            seen |= {problem.defect for problem in error.problems}
+    assert seen == set(Defect) - {Defect.no_hole}
 
 
 def followed(remedy, V, F, problems):
