@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 4_550,
     "running": 7_250,
     "drawing": 1_600,
-    "report": 7_850,
+    "report": 7_600,
     "validation": 2_350,
     "morphing": 1_750,
     "api": 6_400,

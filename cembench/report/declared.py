@@ -22,6 +22,7 @@ entry keeps its record's key, its origin, and why it has no number.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
@@ -60,6 +61,7 @@ from cembench.results.columns import (
     worded,
 )
 from cembench.results.frame import evaluate
+from cembench.results.frame import filled as filled_in
 from cembench.results.records import Record
 
 if TYPE_CHECKING:
@@ -109,6 +111,9 @@ class DeclaredColumn(Declaration):
 
     column: str = ""
     value: str = ""
+    #: Of a value: how it is written, with expressions in braces, and why it may be missing.
+    text: str = ""
+    lacking: str = "no figure"
     title: str = ""
     group: str = ""
     unit: str = ""
@@ -156,6 +161,10 @@ class DeclaredTable(Declaration):
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
     rows: Literal["record", "algorithm", "surface", "cause"] = "record"
     where: str = ""
+    #: Of algorithms: what the first column is called.
+    heading: str = ""
+    #: Further columns, expressions over all the records that the table is about.
+    given: Mapping[str, str] = {}
     #: "first": the run's first linear-algebra policy; "all".
     policy: Literal["first", "all"] = "first"
     #: Columns of the frame by which the records of a surface are sorted.
@@ -207,6 +216,7 @@ def declared_table(
     surfaces: Sequence[MeasuredSurface] = (),
     notes: Sequence[str] = (),
     called: str = "",
+    policy: str = "",
     **texts: str,
 ) -> Table | None:
     """Return a declared table over a run; None if no record is in it.
@@ -227,13 +237,16 @@ def declared_table(
         More notes, before those declared.
     called : str
         Another name for the table's file and anchor.
+    policy : str
+        The linear-algebra policy of its records; default: what the declaration says.
     texts : str
         What braces in title and caption stand for, besides ``{policy}``.
 
     """
     spec = declared or own_tables()[name]
-    policy = evidence.policies[0]
-    chosen = [row for row in evidence.frame_rows if spec.policy == "all" or row["solves"] == policy]
+    held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]
+    policy = policy or evidence.policies[0]
+    chosen = [row for row in evidence.frame_rows if row["solves"] in held]
     if keys is not None:
         wanted = set(keys)
         chosen = [row for row in chosen if row["key"] in wanted]
@@ -242,11 +255,13 @@ def declared_table(
     if not chosen:
         return None
     told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
-    told |= {"reference": evidence.reference_label, **texts}
+    once = " Each model counts once, and is preferred over its stand-in."
+    told |= {"once": once if evidence.stand_ins_left_out else "", **texts}
+    told["reference"] = evidence.reference_label
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, chosen))))
     if spec.rows == "surface":
         return _of_surfaces(evidence, spec, chosen, surfaces, called or name, told, below)
-    columns, entries = zip(*_columns(evidence, spec, chosen), strict=True)
+    columns, entries = zip(*_columns(evidence, spec, chosen, told), strict=True)
     title, caption = filled(spec.title, told), filled(spec.caption, told)
     return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
@@ -322,23 +337,26 @@ def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
 
 
 def _columns(
-    evidence: Evidence, spec: DeclaredTable, chosen: Rows
+    evidence: Evidence, spec: DeclaredTable, chosen: Rows, known: Mapping[str, str]
 ) -> list[tuple[Column, list[Value]]]:
     """Return the columns with their entries, those that are optional only if they hold some."""
     first: list[tuple[Column, list[Value]]] = []
     if spec.rows == "record":
         made = [[_entry(evidence, row, one) for row in chosen] for one in spec.columns]
     else:
-        frame = _frame_of(evidence, chosen).sort_values("series", kind="stable")
+        frame = _frame_of(evidence, chosen)
+        frame = frame.assign(**{name: evaluate(of, frame) for name, of in spec.given.items()})
+        frame = frame.sort_values("series", kind="stable")
         groups = (
             by_cause(evidence, frame)
             if spec.rows == "cause"
             else list(frame.groupby("label", sort=False))
         )
-        first = [(Column(spec.rows, numeric=False), [words(str(label)) for label, _ in groups])]
+        title = filled(spec.heading, known) or spec.rows
+        first = [(Column(title, numeric=False), [words(str(label)) for label, _ in groups])]
         made = [[_aggregate(one, group) for _, group in groups] for one in spec.columns]
     return first + [
-        (one.heading, values)
+        (replace(one.heading, title=filled(one.heading.title, known)), values)
         for one, values in zip(spec.columns, made, strict=True)
         if not one.optional or any(value.number for value in values)
     ]
@@ -364,7 +382,8 @@ def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     key = str(evaluate(one.record, group) or "") if one.record else ""
     if isinstance(found, str):
         return Value(found, None, "derived")
-    return entry(found, partial(worded, form=one.form), "no figure", record=key)
+    form = (lambda _: filled_in(one.text, group)) if one.text else partial(worded, form=one.form)
+    return entry(found, form, one.lacking, record=key)
 
 
 def _notes(evidence: Evidence, spec: DeclaredTable, chosen: Rows) -> Iterable[str]:

@@ -109,7 +109,7 @@ def test_braces_that_stand_for_nothing_are_an_error(evidence, tmp_path, text):
     file.write_text(f'[a]\ntitle = "{text}"\ncolumns = ["mesh"]')
     with pytest.raises(ParameterError) as caught:
         further_tables(evidence, [file])
-    assert "known in braces are in_policy, n, policy, reference" in str(caught.value)
+    assert "known in braces are in_policy, n, once, policy, reference" in str(caught.value)
 
 
 @pytest.mark.parametrize(

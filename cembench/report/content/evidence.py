@@ -21,7 +21,7 @@ from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
-from cembench.results.comparison import compare
+from cembench.results.comparison import Comparison, compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import Paper, papers, usual_paper
@@ -163,16 +163,17 @@ class Evidence:
         """The records as a frame, a row each, by surface, series and policy.
 
         Besides the columns of :attr:`frame_rows` it has `as_good`: about as good as the best map to
-        the disk there.
+        the disk there; and of the comparison with the reference's main parameters `comparison`,
+        `speedup` with its interval, `verdict`, `ratio`, and `paired`, the rounds with both.
         """
         import pandas as pd
 
-        frame = pd.DataFrame(self.frame_rows)
+        frame = pd.DataFrame([row | self._compared(row["key"]) for row in self.frame_rows])
         frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
         disks = frame[frame["ok"] & (frame["target"] == DISK)]
         best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
         good = (disks[ANGLE] <= AS_GOOD * best) | (disks[ANGLE] <= best + DEGREES)
-        return frame.assign(as_good=good.reindex(frame.index, fill_value=False))
+        return frame.copy().assign(as_good=good.reindex(frame.index, fill_value=False))
 
     @cached_property
     def frame_rows(self) -> list[dict[str, Any]]:
@@ -181,7 +182,8 @@ class Evidence:
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
         number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
-        model), `printed` (an algorithm of the paper), and `reference`.
+        model), `once` (the same, or of no model), `printed` (an algorithm of the paper), and
+        `reference`.
         """
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
@@ -195,6 +197,7 @@ class Evidence:
             more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
             more["model"], more["origin"] = surface.paper_row or None, surface.origin
             more["counted"] = surface in self.one_per_model
+            more["once"] = surface not in self.stand_ins_left_out
             more["printed"] = own.algorithm in self.paper.algorithms
             more["reference"] = own.algorithm == self.reference
             order = (place, k, self.policies.index(record.cell.solves))
@@ -402,14 +405,32 @@ class Evidence:
         """Return a record as a flat row, compared with the reference."""
         return self.rows[record.cell.key]
 
-    def rate(self, record: Record) -> float | None:
-        """Return t / t_reference - 1 for a record's time t; None without both times.
+    @cached_property
+    def comparisons(self) -> dict[str, Comparison]:
+        """The comparisons of times with the reference, by key; none without both times.
 
-        It is the median ratio within rounds, for the reference with its main parameters on the same
-        surface and with the same policy.
+        It is the reference with its main parameters on the same surface and with the same policy.
         """
-        base = self.base(record)
-        found = None if base is None else compare(record, base)
+        pairs = ((record, self.base(record)) for record in self.records)
+        found = {one.cell.key: compare(one, base) for one, base in pairs if base is not None}
+        return {key: one for key, one in found.items() if one is not None}
+
+    def _compared(self, key: str) -> dict[str, Any]:
+        found = self.comparisons.get(key)
+        interval = found and found.speedup_interval
+        return {
+            "comparison": found,
+            "speedup": found and found.speedup,
+            "speedup_low": interval and interval.low,
+            "speedup_high": interval and interval.high,
+            "verdict": found and found.verdict,
+            "ratio": found and found.ratio,
+            "paired": found.rounds if found else 0,
+        }
+
+    def rate(self, record: Record) -> float | None:
+        """Return t / t_reference - 1 for a record's time t, the median ratio within rounds."""
+        found = self.comparisons.get(record.cell.key)
         return None if found is None else found.speedup
 
     def base(self, record: Record) -> Record | None:

@@ -17,7 +17,6 @@ from cembench.report.content.findings import findings, many_findings, surfaces_w
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
-from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
 from cembench.report.declared_plots import declared_plot
@@ -343,12 +342,12 @@ def _policies(run: _Run) -> list[Item]:
     """Return tables and a plot of both policies; empty if the run has one."""
     if not policies.has_both_policies(run.evidence):
         return []
-    made = (policies.policies_table(run.evidence), policies.speedups_table(run.evidence))
-    return [*made, *run.plots("reuse-against-backslash")]
+    plots = run.plots("reuse-against-backslash")
+    return [policies.policies_table(run.evidence), *run.tables("speedup-by-policy"), *plots]
 
 
 def _certain(run: _Run) -> list[Item]:
-    return [t for policy in run.evidence.policies for t in sure_speedups(run.evidence, policy)]
+    return [t for p in run.evidence.policies for t in policies.sure_speedups(run.evidence, p)]
 
 
 def _beyond_the_paper(run: _Run) -> Section:
