@@ -14,7 +14,7 @@ from functools import cache
 from math import exp, log
 from statistics import mean
 from types import CodeType, MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
@@ -25,6 +25,9 @@ from cembench.results.multiple_testing import corrected, geometric, sign_test
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    #: What expressions are over; without columns where all they name is given.
+    Frame: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 #: Maximum number of entries that :func:`commonest` names.
@@ -154,7 +157,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
 )
 
 
-def evaluate(expression: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> Any:
+def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> Any:
     """Return the value of an expression over a frame; `more` names what else is known in it.
 
     Raises
@@ -199,7 +202,7 @@ def _compiled(expression: str) -> tuple[CodeType, tuple[str, ...]]:
     return compile(tree, "<declaration>", "eval"), tuple(names)
 
 
-def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> str:
+def filled(text: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> str:
     """Return a text with expressions in braces replaced by their values, as in an f-string.
 
     Raises
@@ -210,3 +213,16 @@ def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -
     """
     # The space keeps a quotation mark at the end apart from those around.
     return str(evaluate(f'f"""{text} """', frame, more))[:-1]
+
+
+def phrase(cases: Iterable[Mapping[str, str]], frame: Frame, more: Mapping[str, Any]) -> str:
+    """Return the words of the first case whose condition `when`, if any, holds; "" without one.
+
+    >>> cases = [{"when": "n == 1", "words": "one surface"}, {"words": "{n} surfaces"}]
+    >>> phrase(cases, {}, {"n": 3})
+    '3 surfaces'
+    """
+    for case in cases:
+        if "when" not in case or evaluate(case["when"], frame, more):
+            return filled(case["words"], frame, more)
+    return ""

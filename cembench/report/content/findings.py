@@ -31,7 +31,7 @@ from cembench.results.families import (
     rate_interval,
     share_interval,
 )
-from cembench.results.frame import evaluate, filled
+from cembench.results.frame import phrase
 from cembench.results.intervals import DEFAULT_ROUNDS, Interval
 from cembench.results.stability import outlier_lines, scatter_words, stability_words
 
@@ -121,8 +121,7 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
     }
     for name, cases in own("findings.toml").items():
         if others or name not in _OF_SEVERAL:
-            held = (c for c in cases if "when" not in c or evaluate(c["when"], frame, known))
-            known[name] = filled(next(held)["words"], frame, known)
+            known[name] = phrase(cases, frame, known)
     return known
 
 
