@@ -118,6 +118,8 @@ class DeclaredColumn(Declaration):
     group: str = ""
     unit: str = ""
     form: str = "significant"
+    #: Of surfaces: the linear-algebra policy of its records; default: that of the table.
+    solves: str = ""
     #: Whether its entries are texts.
     words: bool = False
     #: Left out where it is zero or missing in every row.
@@ -177,12 +179,14 @@ class DeclaredTable(Declaration):
 
     @model_validator(mode="after")
     def _fits(self) -> DeclaredTable:
-        takes_columns = self.rows in ("record", "surface")
+        takes_columns = self.rows == "record"
         wrong = [c for c in self.columns if bool(c.value) == takes_columns]
-        if wrong:
+        if wrong and self.rows != "surface":
             what = "columns (column)" if takes_columns else "expressions (value)"
             raise ValueError(f'rows = "{self.rows}" takes {what}, not {wrong[0].title!r}')
-        if self.rows == "surface" and any(c.column not in COLUMNS for c in self.columns):
+        if self.rows == "surface" and any(
+            not c.value and c.column not in COLUMNS for c in self.columns
+        ):
             raise ValueError(f'rows = "surface" takes columns of figures: {", ".join(COLUMNS)}')
         return self
 
@@ -288,7 +292,8 @@ def _of_surfaces(
             star = " *" * (s.target != DISK and "targets" in spec.notes)
             texts = {**known, "algorithm": s.label + star}
             group, title = (filled(text, texts) for text in (one.group, one.heading.title))
-            quantities.append(Quantity(group, s, COLUMNS[one.column], title=title))
+            figure = COLUMNS.get(one.column) or _computed(evidence, one)
+            quantities.append(Quantity(group, s, figure, title=title, policy=one.solves))
     if all("{algorithm}" in one.group for one in spec.columns):
         quantities = [one for k in range(len(series)) for one in quantities[k :: len(series)]]
     footers = [
@@ -300,6 +305,19 @@ def _of_surfaces(
         evidence, name, title, surfaces, quantities,
         policy=policy, caption=caption, footers=footers, notes=notes,
     )  # fmt: skip
+
+
+def _computed(evidence: Evidence, one: DeclaredColumn) -> FrameColumn:
+    """Return a column of an expression over the records of an algorithm on a surface."""
+    frame = evidence.frame
+
+    def of(record: Record) -> Any:
+        own = frame[frame["key"] == record.cell.key].iloc[0]
+        return evaluate(
+            one.value, frame[(frame["place"] == own["place"]) & (frame["series"] == own["series"])]
+        )
+
+    return FrameColumn(one.value, of, form=one.form, lacking=one.lacking)
 
 
 def _frame_of(evidence: Evidence, rows: Rows) -> pd.DataFrame:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from cembench.report.by_surface import MEAN_RATIO, POLICIES, Quantity, policy_suffix, table_beside
+from cembench.report.by_surface import POLICIES, policy_suffix
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table
 from cembench.report.document import Gap, Table
-from cembench.results.columns import COLUMNS, FrameColumn, counted
+from cembench.results.columns import counted
 from cembench.results.frame import filled
-from cembench.results.records import Record
 
 REUSE, BACKSLASH = BOTH = tuple(POLICIES)
 
@@ -25,35 +24,6 @@ def one_policy_gap(evidence: Evidence) -> Gap:
         "Factorisations reused or repeated",
         f"this run has only one linear-algebra policy: {', '.join(evidence.policies)}.",
         f"the same `cembench run` with --solves reuse,backslash (missing here: {other})",
-    )
-
-
-def policies_table(evidence: Evidence) -> Table:
-    """Return a table of seconds under both policies and their ratio, for every algorithm."""
-    frame = evidence.frame
-    known = frame[frame["ok"]].pivot(
-        index=["mesh_hash", "label"], columns="solves", values="seconds"
-    )
-    ratios = (known[BACKSLASH] / known[REUSE]).dropna().to_dict()
-    quantities = []
-    for series in evidence.series:
-
-        def ratio(record: Record, label: str = series.label) -> float | None:
-            return ratios.get((record.cell.mesh_hash, label))
-
-        of_ratio = FrameColumn("ratio", ratio, form=".2f", lacking="not under both policies")
-        seconds = COLUMNS["seconds"]
-        quantities += [Quantity(series.label, series, seconds, title=p, policy=p) for p in BOTH]
-        quantities.append(Quantity(series.label, series, of_ratio, title="ratio", policy=REUSE))
-    return table_beside(
-        evidence,
-        "reuse-against-backslash",
-        "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
-        evidence.surfaces,
-        quantities,
-        caption="The ratio shows what an implementation saves by reusing a factorisation, "
-        "whatever the algorithm. The paper's MATLAB code factored at every solve.",
-        footers=(MEAN_RATIO,),
     )
 
 

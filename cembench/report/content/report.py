@@ -342,8 +342,8 @@ def _policies(run: _Run) -> list[Item]:
     """Return tables and a plot of both policies; empty if the run has one."""
     if not policies.has_both_policies(run.evidence):
         return []
-    plots = run.plots("reuse-against-backslash")
-    return [policies.policies_table(run.evidence), *run.tables("speedup-by-policy"), *plots]
+    tables = run.tables("reuse-against-backslash", "speedup-by-policy")
+    return [*tables, *run.plots("reuse-against-backslash")]
 
 
 def _certain(run: _Run) -> list[Item]:
