@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 4_600,
     "running": 7_250,
     "drawing": 1_600,
-    "report": 7_550,
+    "report": 7_500,
     "validation": 2_350,
     "morphing": 1_750,
     "api": 6_400,

@@ -24,12 +24,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from cembench.core.names import slug
 from cembench.report.by_surface import (
     POLICIES,
     Footer,
@@ -40,13 +38,10 @@ from cembench.report.by_surface import (
 )
 from cembench.report.content.causes import by_cause
 from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
-from cembench.report.declarations import Declaration, filled, own, parsed, read
+from cembench.report.declarations import Declaration, filled, own, parsed
 from cembench.report.document import (
     Column,
-    Item,
-    Section,
     Table,
-    Text,
     Value,
     entry,
     of_status,
@@ -161,7 +156,7 @@ class DeclaredTable(Declaration):
 
     title: str
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
-    rows: Literal["record", "algorithm", "surface", "cause"] = "record"
+    rows: Literal["record", "algorithm", "name", "surface", "cause"] = "record"
     where: str = ""
     #: Of algorithms: what the first column is called.
     heading: str = ""
@@ -189,20 +184,6 @@ class DeclaredTable(Declaration):
         ):
             raise ValueError(f'rows = "surface" takes columns of figures: {", ".join(COLUMNS)}')
         return self
-
-
-def read_tables(path: Path) -> dict[str, DeclaredTable]:
-    """Return the tables that a TOML file declares, by name.
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be read, or a declaration is wrong.
-
-    """
-    # cembench.report.declared_plots reads the plots.
-    tables = {name: table for name, table in read(path).items() if name != "plots"}
-    return parsed(tables, DeclaredTable, str(path))
 
 
 @cache
@@ -258,10 +239,11 @@ def declared_table(
         chosen = _selected(evidence, spec, chosen)
     if not chosen:
         return None
-    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
     once = " Each model counts once, and is preferred over its stand-in."
-    told |= {"once": once if evidence.stand_ins_left_out else "", **texts}
-    told["reference"] = evidence.reference_label
+    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
+    told |= {"surfaces": str(len({row["place"] for row in chosen}))}
+    told |= {"once": once if evidence.stand_ins_left_out else ""}
+    told |= {"reference": evidence.reference_label, **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, chosen))))
     if spec.rows == "surface":
         return _of_surfaces(evidence, spec, chosen, surfaces, called or name, told, below)
@@ -334,26 +316,6 @@ def _selected(evidence: Evidence, spec: DeclaredTable, rows: Rows) -> Rows:
     return [by_key[key] for key in frame["key"]]
 
 
-def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
-    """Return the tables that these files declare, each file's as a section.
-
-    Raises
-    ------
-    ParameterError
-        A declaration is wrong, or does not fit the run.
-
-    """
-    sections: list[Section] = []
-    for number, path in enumerate(paths, start=1):
-        items: list[Item] = []
-        for name, declared in read_tables(path).items():
-            called = f"declared-{number}-{slug(name)}"
-            made = declared_table(evidence, name, declared, called=called)
-            items.append(made or Text(f"{declared.title}: no record of this run is in this table."))
-        sections.append(Section(f"declared-{number}", f"Tables of {path.name}", tuple(items)))
-    return sections
-
-
 def _columns(
     evidence: Evidence, spec: DeclaredTable, chosen: Rows, known: Mapping[str, str]
 ) -> list[tuple[Column, list[Value]]]:
@@ -368,7 +330,7 @@ def _columns(
         groups = (
             by_cause(evidence, frame)
             if spec.rows == "cause"
-            else list(frame.groupby("label", sort=False))
+            else list(frame.groupby("algorithm" if spec.rows == "name" else "label", sort=False))
         )
         title = filled(spec.heading, known) or spec.rows
         first = [(Column(title, numeric=False), [words(str(label)) for label, _ in groups])]

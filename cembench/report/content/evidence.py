@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -475,12 +474,6 @@ class Evidence:
             why = f"it has {len(uv)} vertices, the record {record.mesh.vertices}"
             raise damaged(file, f"the map of {record.cell.label}", why)
         return uv
-
-
-def figure_of(record: Record, metric: str) -> float:
-    """Return a figure of a map; infinite if the cell did not end ok."""
-    found = record.outcome.metrics.get(metric)
-    return inf if record.outcome.status != "ok" or found is None else float(found)
 
 
 def model_surface(model: str) -> str:
