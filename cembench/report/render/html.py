@@ -32,7 +32,6 @@ from cembench.core.atomic import write_text
 from cembench.report.document import (
     ORIGINS,
     Claim,
-    Column,
     Figure,
     Gallery,
     Item,
@@ -41,6 +40,7 @@ from cembench.report.document import (
     Table,
     Value,
     csv_of,
+    groups_of,
     items_of,
 )
 from cembench.report.pictures import (
@@ -289,7 +289,7 @@ def _table(table: Table, keys: Mapping[str, str], anchor: str) -> Mapping[str, A
                 strict=True,
             )
         ],
-        "groups": _groups(table.columns),
+        "groups": groups_of(table.columns),
         "rows": rows[: len(body)],
         "footers": rows[len(body) :],
         "notes": [note for note in table.notes if note not in table.places.values()],
@@ -311,13 +311,6 @@ def _sortable(number: float | None) -> str:
 def _common_origin(values: Sequence[Value]) -> Any:
     found = {value.origin for value in values if value.number is not None}
     return found.pop() if len(found) == 1 else ""
-
-
-def _groups(columns: Sequence[Column]) -> list[tuple[str, int]]:
-    """Return the group headings with their numbers of columns; empty without groups."""
-    if not any(column.group for column in columns):
-        return []
-    return [(name, len(list(run))) for name, run in groupby(columns, lambda c: c.group)]
 
 
 def _letters(place: int) -> str:

@@ -14,7 +14,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from cembench.core.atomic import write_text
-from cembench.report.document import Figure, Report, Table, is_prose, items_of, tex_of
+from cembench.report.document import Figure, Report, Table, groups_of, is_prose, items_of, tex_of
 from cembench.report.render.templates import environment
 
 #: Replacements of characters; other non-Latin characters lose their accents or become "?".
@@ -61,7 +61,7 @@ def _forms() -> Any:
     }
     found = environment(escape, **marks)
     found.filters |= {"tex": lambda table: tex_of(table).with_suffix(""), "printable": _printable}
-    known = {"is_prose": is_prose, "portions": _portions, "groups_of": _groups}
+    known = {"is_prose": is_prose, "portions": _portions, "groups_of": groups_of}
     return found.get_template("latex.jinja", globals=known).module
 
 
@@ -109,12 +109,3 @@ def _portions(table: Table) -> list[Table]:
         for part in (table.only(sorted([*common, *places])) for places in wide)
         for k in starts
     ]
-
-
-def _groups(table: Table) -> list[tuple[str, int, int]]:
-    """Return the groups of columns, each with their number and the place of the first."""
-    found, place = [], 1
-    for group, members in groupby(column.group for column in table.columns):
-        found.append((group, count := len(list(members)), place))
-        place += count
-    return found if any(group for group, *_ in found) else []
