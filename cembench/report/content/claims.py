@@ -80,8 +80,7 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
     paper = evidence.paper
 
     def disk(key: str) -> TriangleMesh | None:
-        place = evidence.by_key[key].cell.mesh_hash
-        mesh = evidence.mesh(next(s for s in evidence.surfaces if s.mesh_hash == place))
+        mesh = evidence.mesh(evidence.by_hash[evidence.by_key[key].cell.mesh_hash])
         return mesh if mesh is not None and len(mesh.loops) == 1 else None
 
     return {

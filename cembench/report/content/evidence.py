@@ -220,7 +220,7 @@ class Evidence:
         """The difficulty of each surface that has a map to the disk, by its hash."""
         best, found = self.best_maps, {}
         for of_surface, key in best["key"][best["target"] == DISK].items():
-            mesh = self.mesh(next(s for s in self.surfaces if s.mesh_hash == of_surface))
+            mesh = self.mesh(self.by_hash[str(of_surface)])
             uv = self.uv(self.by_key[key])
             if mesh is not None and uv is not None and (one := difficulty(mesh, uv)):
                 found[str(of_surface)] = one
@@ -229,21 +229,18 @@ class Evidence:
     @cached_property
     def shapes(self) -> dict[str, Shape]:
         """What makes each surface's triangulation hard to map, by its hash, if it was saved."""
-        meshes = ((s.mesh_hash, self.mesh(s)) for s in self.surfaces)
-        return {key: shape(mesh) for key, mesh in meshes if mesh is not None}
+        meshes = {key: self.mesh(surface) for key, surface in self.by_hash.items()}
+        return {key: shape(mesh) for key, mesh in meshes.items() if mesh is not None}
 
     @cached_property
     def by_key(self) -> dict[str, Record]:
         """The records by the keys of their cells."""
         return {record.cell.key: record for record in self.records}
 
-    def origin_of(self, record: Record) -> MeshOrigin:
-        """Return the origin of a record's figures."""
-        return self._origins[record.cell.mesh_hash]
-
     @cached_property
-    def _origins(self) -> dict[str, MeshOrigin]:
-        return {surface.mesh_hash: surface.origin for surface in self.surfaces}
+    def by_hash(self) -> dict[str, MeasuredSurface]:
+        """The surfaces by the hashes of their meshes."""
+        return {surface.mesh_hash: surface for surface in self.surfaces}
 
     @cached_property
     def machines(self) -> Marks:
