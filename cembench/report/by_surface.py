@@ -84,7 +84,8 @@ def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Val
             why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
         text = f"{text}{'!' if why else ''} {evidence.machines.of(record)}".rstrip()
     tone: Tone = "doubtful" if why else ""
-    return Value(text, float(number), evidence.origin_of(record), key, why, tone)
+    origin = evidence.by_hash[record.cell.mesh_hash].origin
+    return Value(text, float(number), origin, key, why, tone)
 
 
 def paper_value(paper: Paper, table: int, model: str, column: str, digits: int) -> Value:

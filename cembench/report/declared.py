@@ -22,13 +22,12 @@ entry keeps its record's key, its origin, and why it has no number.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from functools import cache, partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
-from cembench.core.names import slug
 from cembench.report.by_surface import (
     POLICIES,
     Footer,
@@ -39,13 +38,10 @@ from cembench.report.by_surface import (
 )
 from cembench.report.content.causes import by_cause
 from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
-from cembench.report.declarations import Declaration, filled, own, parsed, read
+from cembench.report.declarations import Declaration, filled, own, parsed
 from cembench.report.document import (
     Column,
-    Item,
-    Section,
     Table,
-    Text,
     Value,
     entry,
     of_status,
@@ -60,6 +56,7 @@ from cembench.results.columns import (
     worded,
 )
 from cembench.results.frame import evaluate
+from cembench.results.frame import filled as filled_in
 from cembench.results.records import Record
 
 if TYPE_CHECKING:
@@ -109,10 +106,15 @@ class DeclaredColumn(Declaration):
 
     column: str = ""
     value: str = ""
+    #: Of a value: how it is written, with expressions in braces, and why it may be missing.
+    text: str = ""
+    lacking: str = "no figure"
     title: str = ""
     group: str = ""
     unit: str = ""
     form: str = "significant"
+    #: Of surfaces: the linear-algebra policy of its records; default: that of the table.
+    solves: str = ""
     #: Whether its entries are texts.
     words: bool = False
     #: Left out where it is zero or missing in every row.
@@ -154,8 +156,12 @@ class DeclaredTable(Declaration):
 
     title: str
     columns: tuple[DeclaredColumn, ...] = Field(min_length=1)
-    rows: Literal["record", "algorithm", "surface", "cause"] = "record"
+    rows: Literal["record", "algorithm", "name", "surface", "cause"] = "record"
     where: str = ""
+    #: Of algorithms: what the first column is called.
+    heading: str = ""
+    #: Further columns, expressions over all the records that the table is about.
+    given: Mapping[str, str] = {}
     #: "first": the run's first linear-algebra policy; "all".
     policy: Literal["first", "all"] = "first"
     #: Columns of the frame by which the records of a surface are sorted.
@@ -168,28 +174,16 @@ class DeclaredTable(Declaration):
 
     @model_validator(mode="after")
     def _fits(self) -> DeclaredTable:
-        takes_columns = self.rows in ("record", "surface")
+        takes_columns = self.rows == "record"
         wrong = [c for c in self.columns if bool(c.value) == takes_columns]
-        if wrong:
+        if wrong and self.rows != "surface":
             what = "columns (column)" if takes_columns else "expressions (value)"
             raise ValueError(f'rows = "{self.rows}" takes {what}, not {wrong[0].title!r}')
-        if self.rows == "surface" and any(c.column not in COLUMNS for c in self.columns):
+        if self.rows == "surface" and any(
+            not c.value and c.column not in COLUMNS for c in self.columns
+        ):
             raise ValueError(f'rows = "surface" takes columns of figures: {", ".join(COLUMNS)}')
         return self
-
-
-def read_tables(path: Path) -> dict[str, DeclaredTable]:
-    """Return the tables that a TOML file declares, by name.
-
-    Raises
-    ------
-    ParameterError
-        The file cannot be read, or a declaration is wrong.
-
-    """
-    # cembench.report.declared_plots reads the plots.
-    tables = {name: table for name, table in read(path).items() if name != "plots"}
-    return parsed(tables, DeclaredTable, str(path))
 
 
 @cache
@@ -207,6 +201,7 @@ def declared_table(
     surfaces: Sequence[MeasuredSurface] = (),
     notes: Sequence[str] = (),
     called: str = "",
+    policy: str = "",
     **texts: str,
 ) -> Table | None:
     """Return a declared table over a run; None if no record is in it.
@@ -227,13 +222,16 @@ def declared_table(
         More notes, before those declared.
     called : str
         Another name for the table's file and anchor.
+    policy : str
+        The linear-algebra policy of its records; default: what the declaration says.
     texts : str
         What braces in title and caption stand for, besides ``{policy}``.
 
     """
     spec = declared or own_tables()[name]
-    policy = evidence.policies[0]
-    chosen = [row for row in evidence.frame_rows if spec.policy == "all" or row["solves"] == policy]
+    held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]
+    policy = policy or evidence.policies[0]
+    chosen = [row for row in evidence.frame_rows if row["solves"] in held]
     if keys is not None:
         wanted = set(keys)
         chosen = [row for row in chosen if row["key"] in wanted]
@@ -241,12 +239,15 @@ def declared_table(
         chosen = _selected(evidence, spec, chosen)
     if not chosen:
         return None
+    once = " Each model counts once, and is preferred over its stand-in."
     told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
+    told |= {"surfaces": str(len({row["place"] for row in chosen}))}
+    told |= {"once": once if evidence.stand_ins_left_out else ""}
     told |= {"reference": evidence.reference_label, **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, chosen))))
     if spec.rows == "surface":
         return _of_surfaces(evidence, spec, chosen, surfaces, called or name, told, below)
-    columns, entries = zip(*_columns(evidence, spec, chosen), strict=True)
+    columns, entries = zip(*_columns(evidence, spec, chosen, told), strict=True)
     title, caption = filled(spec.title, told), filled(spec.caption, told)
     return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
@@ -273,7 +274,8 @@ def _of_surfaces(
             star = " *" * (s.target != DISK and "targets" in spec.notes)
             texts = {**known, "algorithm": s.label + star}
             group, title = (filled(text, texts) for text in (one.group, one.heading.title))
-            quantities.append(Quantity(group, s, COLUMNS[one.column], title=title))
+            figure = COLUMNS.get(one.column) or _computed(evidence, one)
+            quantities.append(Quantity(group, s, figure, title=title, policy=one.solves))
     if all("{algorithm}" in one.group for one in spec.columns):
         quantities = [one for k in range(len(series)) for one in quantities[k :: len(series)]]
     footers = [
@@ -285,6 +287,19 @@ def _of_surfaces(
         evidence, name, title, surfaces, quantities,
         policy=policy, caption=caption, footers=footers, notes=notes,
     )  # fmt: skip
+
+
+def _computed(evidence: Evidence, one: DeclaredColumn) -> FrameColumn:
+    """Return a column of an expression over the records of an algorithm on a surface."""
+    frame = evidence.frame
+
+    def of(record: Record) -> Any:
+        own = frame[frame["key"] == record.cell.key].iloc[0]
+        return evaluate(
+            one.value, frame[(frame["place"] == own["place"]) & (frame["series"] == own["series"])]
+        )
+
+    return FrameColumn(one.value, of, form=one.form, lacking=one.lacking)
 
 
 def _frame_of(evidence: Evidence, rows: Rows) -> pd.DataFrame:
@@ -301,44 +316,27 @@ def _selected(evidence: Evidence, spec: DeclaredTable, rows: Rows) -> Rows:
     return [by_key[key] for key in frame["key"]]
 
 
-def further_tables(evidence: Evidence, paths: Iterable[Path]) -> list[Section]:
-    """Return the tables that these files declare, each file's as a section.
-
-    Raises
-    ------
-    ParameterError
-        A declaration is wrong, or does not fit the run.
-
-    """
-    sections: list[Section] = []
-    for number, path in enumerate(paths, start=1):
-        items: list[Item] = []
-        for name, declared in read_tables(path).items():
-            called = f"declared-{number}-{slug(name)}"
-            made = declared_table(evidence, name, declared, called=called)
-            items.append(made or Text(f"{declared.title}: no record of this run is in this table."))
-        sections.append(Section(f"declared-{number}", f"Tables of {path.name}", tuple(items)))
-    return sections
-
-
 def _columns(
-    evidence: Evidence, spec: DeclaredTable, chosen: Rows
+    evidence: Evidence, spec: DeclaredTable, chosen: Rows, known: Mapping[str, str]
 ) -> list[tuple[Column, list[Value]]]:
     """Return the columns with their entries, those that are optional only if they hold some."""
     first: list[tuple[Column, list[Value]]] = []
     if spec.rows == "record":
         made = [[_entry(evidence, row, one) for row in chosen] for one in spec.columns]
     else:
-        frame = _frame_of(evidence, chosen).sort_values("series", kind="stable")
+        frame = _frame_of(evidence, chosen)
+        frame = frame.assign(**{name: evaluate(of, frame) for name, of in spec.given.items()})
+        frame = frame.sort_values("series", kind="stable")
         groups = (
             by_cause(evidence, frame)
             if spec.rows == "cause"
-            else list(frame.groupby("label", sort=False))
+            else list(frame.groupby("algorithm" if spec.rows == "name" else "label", sort=False))
         )
-        first = [(Column(spec.rows, numeric=False), [words(str(label)) for label, _ in groups])]
+        title = filled(spec.heading, known) or spec.rows
+        first = [(Column(title, numeric=False), [words(str(label)) for label, _ in groups])]
         made = [[_aggregate(one, group) for _, group in groups] for one in spec.columns]
     return first + [
-        (one.heading, values)
+        (replace(one.heading, title=filled(one.heading.title, known)), values)
         for one, values in zip(spec.columns, made, strict=True)
         if not one.optional or any(value.number for value in values)
     ]
@@ -364,7 +362,8 @@ def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     key = str(evaluate(one.record, group) or "") if one.record else ""
     if isinstance(found, str):
         return Value(found, None, "derived")
-    return entry(found, partial(worded, form=one.form), "no figure", record=key)
+    form = (lambda _: filled_in(one.text, group)) if one.text else partial(worded, form=one.form)
+    return entry(found, form, one.lacking, record=key)
 
 
 def _notes(evidence: Evidence, spec: DeclaredTable, chosen: Rows) -> Iterable[str]:

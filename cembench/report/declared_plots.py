@@ -16,7 +16,7 @@ Points are rows of the run's frame, or of one that is made of it (:mod:`cembench
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -28,7 +28,8 @@ from cembench.core.errors import ParameterError
 from cembench.core.names import slug
 from cembench.report.content.evidence import AS_GOOD, DEGREES, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration, filled, own, parsed, read
-from cembench.report.document import Text
+from cembench.report.declared import DeclaredTable, declared_table
+from cembench.report.document import Item, Section, Text
 from cembench.report.palette import SeriesStyle, phase_style, series_styles
 from cembench.report.plot_rows import (
     ROWS,
@@ -146,21 +147,31 @@ def own_plots(evidence: Evidence) -> dict[str, DeclaredPlot]:
     return parsed(known, DeclaredPlot, f"plots.toml or {paper.folder / 'figures.toml'}")
 
 
-def further_plots(evidence: Evidence, path: Path, number: int) -> list[Plot | Text]:
-    """Return the plots that a file declares below ``[plots]``; a text where there is nothing.
+def further(
+    evidence: Evidence, paths: Iterable[Path]
+) -> list[tuple[Section, list[Plot | Item | None]]]:
+    """Return what files declare, a section each and its tables and plots, not drawn yet.
 
     Raises
     ------
     ParameterError
-        A declaration is wrong, or does not fit the run.
+        A file cannot be read, or a declaration is wrong or does not fit the run.
 
     """
-    declared = parsed(read(path).get("plots", {}), DeclaredPlot, f"{path}, plots")
-    return [
-        declared_plot(evidence, name, one, called=f"declared-{number}-{slug(name)}")
-        or Text(f"{one.title}: no record of this run is in this plot.")
-        for name, one in declared.items()
-    ]
+    sections = []
+    for number, path in enumerate(paths, start=1):
+        given = dict(read(path))
+        plots = parsed(given.pop("plots", {}), DeclaredPlot, f"{path}, plots")
+        tables = parsed(given, DeclaredTable, str(path))
+        items: list[Plot | Item | None] = []
+        both: Iterable[tuple[str, Any]] = (*tables.items(), *plots.items())
+        for name, one in both:
+            called, of_plot = f"declared-{number}-{slug(name)}", isinstance(one, DeclaredPlot)
+            make: Any = declared_plot if of_plot else declared_table
+            gap = f"{one.title}: no record of this run is in this {'plot' if of_plot else 'table'}."
+            items.append(make(evidence, name, one, called=called) or Text(gap))
+        sections.append((Section(f"declared-{number}", f"Tables of {path.name}"), items))
+    return sections
 
 
 class _Drawn(NamedTuple):

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
@@ -374,6 +375,12 @@ def heading(column: Column) -> str:
     """Return group, title and unit as one heading."""
     named = " ".join(part for part in (column.group, column.title) if part)
     return f"{named} [{column.unit}]" if column.unit else named
+
+
+def groups_of(columns: Sequence[Column]) -> list[tuple[str, int]]:
+    """Return the headings of groups with their numbers of columns; empty without groups."""
+    found = [(name, len(list(run))) for name, run in groupby(column.group for column in columns)]
+    return found if any(name for name, _ in found) else []
 
 
 def is_prose(table: Table, place: int) -> bool:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import isnan
 
-from cembench.report.content.evidence import ANGLE, Evidence
+from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
 from cembench.report.document import (
     Column,
@@ -189,33 +187,17 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
 
 def many_table(evidence: Evidence) -> Table:
     """Return valid maps, angle errors, seconds and commonest faults by algorithm."""
-    frame, rows, causes = evidence.frame, [], Counter[tuple[str, str, str]]()
-    for name in dict.fromkeys(record.cell.algorithm for record in evidence.records):
-        own = frame[frame["algorithm"] == name]
-        ok = own[own["ok"]]
-        angles, seconds = (ok[column].dropna().astype(float) for column in (ANGLE, "seconds"))
-        known = [angles.median(), angles.quantile(0.9), angles.max(), seconds.median()]
-        known = [None if isnan(number) else float(number) for number in known]
-        rows.append([name, len(own), len(ok), len(ok) / len(own), *known])
-        for faults, status in zip(own["faults"], own["status"], strict=True):
-            causes.update((name, status, kind.replace("_", " ")) for kind in faults)
+    frame = evidence.frame[["algorithm", "status", "faults"]].explode("faults").dropna()
+    causes = frame.value_counts(sort=False).sort_values(ascending=False, kind="stable")
     notes = [
-        f"{count:>6}  {name}: {status}, {kind}"
-        for (name, status, kind), count in causes.most_common(MOST_CAUSES)
+        f"{count:>6}  {name}: {status}, {kind.replace('_', ' ')}"
+        for (name, status, kind), count in causes[:MOST_CAUSES].items()
     ]
     if len(causes) > MOST_CAUSES:
         notes.append(f"        and {len(causes) - MOST_CAUSES} other kinds")
-    titles = [Column(f"{t}°", form=".2f", lacking="no map") for t in ("median", "90 %", "worst")]
-    return Table.of(
-        "many",
-        f"Valid maps, angle errors and median seconds over {len(evidence.surfaces)} surfaces",
-        [
-            *(ALGORITHM, Column("surfaces"), Column("ok"), Column("share", form=".1%"), *titles),
-            Column("seconds", form=".3g", lacking="not timed"),
-        ],
-        rows,
-        notes=tuple(notes),
-    )
+    table = declared_table(evidence, "many", notes=notes)
+    assert table is not None, "a run has records"
+    return table
 
 
 def machine_lines(marked: Marks) -> list[str]:

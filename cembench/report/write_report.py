@@ -22,8 +22,7 @@ from cembench.core.atomic import draft_folder, unwritable
 from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report
-from cembench.report.declared import further_tables
-from cembench.report.declared_plots import further_plots
+from cembench.report.declared_plots import further
 from cembench.report.document import Report
 from cembench.report.export import export_rows, write_tables_csv
 from cembench.report.export_format import Format
@@ -69,8 +68,7 @@ def write_report(
     """
     require(Extra.REPORT, "a report")
     evidence = Evidence.of(run, paper, records)
-    further = further_tables(evidence, tables)
-    plots = [further_plots(evidence, path, k) for k, path in enumerate(tables, start=1)]
+    declared = further(evidence, tables)
     folders.check(folder, "report")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -79,8 +77,8 @@ def write_report(
             with shared_drawing(jobs if (run / "meshes").is_dir() else 1):
                 report = build_report(evidence, draft, command, progress)
                 more = [
-                    replace(section, items=(*section.items, *drawn(declared, draft)))
-                    for section, declared in zip(further, plots, strict=True)
+                    replace(section, items=tuple(drawn(items, draft)))
+                    for section, items in declared
                 ]
                 report = replace(report, sections=(*report.sections, *more))
             _write_all(report, evidence, draft)

@@ -11,18 +11,23 @@ import ast
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
+from math import exp, log
+from statistics import mean
 from types import CodeType, MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from cembench.core.errors import ParameterError
 from cembench.results.columns import significant
-from cembench.results.families import family_means, share_interval
-from cembench.results.multiple_testing import geometric, sign_test
+from cembench.results.families import average_interval, family_means, share_interval, votes
+from cembench.results.multiple_testing import corrected, geometric, sign_test
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    #: What expressions are over; without columns where all they name is given.
+    Frame: TypeAlias = pd.DataFrame | Mapping[str, Any]
 
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 #: Maximum number of entries that :func:`commonest` names.
@@ -85,6 +90,27 @@ def listed(before: str, texts: Iterable[object], after: str = "", between: str =
     return f"{before}{found}{after}" if found else ""
 
 
+def _corrected(of: pd.Series) -> pd.Series:
+    """Return the verdicts of comparisons that are all right together."""
+    import pandas as pd
+
+    return pd.Series([one.verdict for one in corrected(list(of))], index=of.index)
+
+
+def _wins(of: pd.Series, families: pd.Series) -> tuple[int, int]:
+    """Return for how many families most ratios are above 1, and below."""
+    return votes([1.0] * len(of), list(of), list(families))
+
+
+def _family_geometric(of: pd.Series, families: pd.Series) -> float:
+    return exp(mean(family_means(list(map(log, of)), list(families))))
+
+
+def _family_interval(of: pd.Series, families: pd.Series) -> str | None:
+    found = average_interval(list(of), list(families))
+    return f"{found.low:.2f} to {found.high:.2f}" if found else None
+
+
 def _percentile(known: Any, q: float) -> float:
     return float(np.percentile(known, q))
 
@@ -104,12 +130,17 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "share": _share,
         "share_interval": _share_words,
         "family_percentile": _family_percentile,
+        "family_geometric": _family_geometric,
+        "family_interval": _family_interval,
+        "wins": _wins,
+        "corrected": _corrected,
         "mean": _figure(np.mean),
         "median": _figure(np.median),
         "percentile": _figure(_percentile),
         "smallest": _figure(np.min),
         "largest": _figure(np.max),
         "geometric": _figure(geometric),
+        "geometric_rate": _figure(lambda rates: geometric(1 + rates) - 1),
         "at_largest": _at_largest,
         "first": lambda of: of.iloc[0] if len(of) else None,
         "commonest": commonest,
@@ -126,7 +157,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
 )
 
 
-def evaluate(expression: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> Any:
+def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> Any:
     """Return the value of an expression over a frame; `more` names what else is known in it.
 
     Raises
@@ -171,7 +202,7 @@ def _compiled(expression: str) -> tuple[CodeType, tuple[str, ...]]:
     return compile(tree, "<declaration>", "eval"), tuple(names)
 
 
-def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -> str:
+def filled(text: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> str:
     """Return a text with expressions in braces replaced by their values, as in an f-string.
 
     Raises
@@ -182,3 +213,16 @@ def filled(text: str, frame: pd.DataFrame, more: Mapping[str, Any] = _NOTHING) -
     """
     # The space keeps a quotation mark at the end apart from those around.
     return str(evaluate(f'f"""{text} """', frame, more))[:-1]
+
+
+def phrase(cases: Iterable[Mapping[str, str]], frame: Frame, more: Mapping[str, Any]) -> str:
+    """Return the words of the first case whose condition `when`, if any, holds; "" without one.
+
+    >>> cases = [{"when": "n == 1", "words": "one surface"}, {"words": "{n} surfaces"}]
+    >>> phrase(cases, {}, {"n": 3})
+    '3 surfaces'
+    """
+    for case in cases:
+        if "when" not in case or evaluate(case["when"], frame, more):
+            return filled(case["words"], frame, more)
+    return ""

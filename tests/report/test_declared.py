@@ -6,7 +6,8 @@ from dataclasses import fields
 import pytest
 
 from cembench.core.errors import ParameterError
-from cembench.report.declared import declared_table, further_tables, own_tables, read_tables
+from cembench.report.declared import declared_table, own_tables
+from cembench.report.declared_plots import further
 from cembench.report.document import Table, Text
 from cembench.report.write_report import write_report
 from cembench.results.columns import COLUMNS, row
@@ -43,8 +44,8 @@ def mine(tmp_path):
 
 
 def test_a_table_from_outside_is_a_few_lines(evidence, mine):
-    (section,) = further_tables(evidence, [mine])
-    by_target, slow, none = section.items
+    ((_, items),) = further(evidence, [mine])
+    by_target, slow, none = items
     assert by_target.title == "Angle errors by algorithm, reuse"
     assert [column.title for column in by_target.columns] == ["algorithm", "maps", "worst"]
     maps = {row[0].text: row[1].number for row in by_target.rows}
@@ -82,11 +83,11 @@ def test_the_report_has_it_in_all_forms(small_run, mine, tmp_path, quick_drawing
         ('[a]\ntitle = "A"\ncolumns = [{ title = "b" }]', 'either "column" or "value"'),
     ],
 )
-def test_a_wrong_declaration_says_where_and_what_is_allowed(tmp_path, text, said):
+def test_a_wrong_declaration_says_where_and_what_is_allowed(evidence, tmp_path, text, said):
     file = tmp_path / "mine.toml"
     file.write_text(text)
     with pytest.raises(ParameterError) as caught:
-        read_tables(file)
+        further(evidence, [file])
     assert said in str(caught.value)
 
 
@@ -99,7 +100,7 @@ def test_a_file_that_is_not_there_is_an_error_before_anything_is_written(small_r
 def test_a_column_of_texts_needs_no_mark(evidence, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text('[a]\ntitle = "A"\ncolumns = ["mesh", "seconds"]')
-    (table,) = further_tables(evidence, [file])[0].items
+    ((_, (table,)),) = further(evidence, [file])
     assert {row[0].text for row in table.rows} == set(evidence.frame["mesh"])
 
 
@@ -108,8 +109,10 @@ def test_braces_that_stand_for_nothing_are_an_error(evidence, tmp_path, text):
     file = tmp_path / "mine.toml"
     file.write_text(f'[a]\ntitle = "{text}"\ncolumns = ["mesh"]')
     with pytest.raises(ParameterError) as caught:
-        further_tables(evidence, [file])
-    assert "known in braces are in_policy, n, policy, reference" in str(caught.value)
+        further(evidence, [file])
+    assert "known in braces are in_policy, n, once, policy, reference, surfaces" in str(
+        caught.value
+    )
 
 
 @pytest.mark.parametrize(
@@ -165,7 +168,7 @@ def test_a_table_of_surfaces_has_a_column_for_each_algorithm_and_aggregates_belo
         'columns = [{ column = "seconds", group = "s", title = "{algorithm}" }]\n'
         'footers = [{ label = "largest", value = "largest(x)", titles = ["CEM"] }]'
     )
-    (table,) = further_tables(evidence, [file])[0].items
+    ((_, (table,)),) = further(evidence, [file])
     labels = [series.label for series in evidence.series if series.main]
     assert table.title == f"A, {len(evidence.surfaces)}"
     assert [(c.group, c.title) for c in table.columns[2:]] == [("s", label) for label in labels]

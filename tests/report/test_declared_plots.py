@@ -14,7 +14,7 @@ from cembench.report.declarations import parsed
 from cembench.report.declared_plots import (
     DeclaredPlot,
     declared_plot,
-    further_plots,
+    further,
     own_plots,
 )
 from cembench.report.document import Text
@@ -86,7 +86,8 @@ def test_expressions_by_surface_are_of_its_records(evidence):
 def test_nothing_to_draw_is_said(evidence, tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(f'[plots.none]\n{LEAST}where = "seconds < 0"')
-    assert further_plots(evidence, file, 1) == [Text("A: no record of this run is in this plot.")]
+    ((_, items),) = further(evidence, [file])
+    assert items == [Text("A: no record of this run is in this plot.")]
 
 
 @pytest.mark.parametrize(

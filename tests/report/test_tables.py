@@ -2,7 +2,6 @@ import pytest
 from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.policies import policies_table
 from cembench.report.content.printed_tables import (
     READINGS,
     averages_table,
@@ -184,7 +183,7 @@ def test_the_misprint_is_marked(evidence):
 
 
 def test_both_ways_of_solving_stand_side_by_side(evidence):
-    table = policies_table(evidence)
+    table = declared_table(evidence, "reuse-against-backslash")
     row = next(r for r in table.rows if r[0].text == "Chinese Vase")
     cem = [v.number for c, v in zip(table.columns, row, strict=True) if c.group == "CEM"]
     assert cem == [1.0, 2.0, 2.0]

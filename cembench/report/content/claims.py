@@ -15,7 +15,6 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.document import Claim, Verdict
-from cembench.results.comparison import compare
 from cembench.results.frame import evaluate, filled
 from cembench.results.papers import StatedClaim
 from cembench.results.records import MeshOrigin
@@ -57,31 +56,23 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
     """Return the run's frame with what claims need besides.
 
     `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
-    their algorithm on a surface, whatever the policy. `speedup`, `speedup_low` and `verdict`
-    compare with the main parameters of the reference. `below_one` is the share of the corners whose
+    their algorithm on a surface, whatever the policy. `below_one` is the share of the corners whose
     angles change by less than a degree.
     """
-    import pandas as pd
-
-    frame, rows = evidence.frame, []
-    for key, k, place in zip(frame["key"], frame["series"], frame["place"], strict=True):
-        record, series, surface = evidence.by_key[key], evidence.series[k], evidence.surfaces[place]
-        base, seen = evidence.base(record), inspections.get(surface.mesh_hash)
-        found = compare(record, base) if base is not None else None
-        interval = found.speedup_interval if found else None
-        angles = seen.angles.get(series.label) if seen else None
-        chosen = evidence.find(surface, series) is record
-        rows.append(
-            {
-                "policy": evidence.policies.index(record.cell.solves),
-                "chosen": chosen,
-                "speedup": found.speedup if found else None,
-                "speedup_low": interval.low if interval else None,
-                "verdict": found.verdict if found else None,
-                "below_one": angles.below_one if angles and chosen else None,
-            }
-        )
-    return frame.assign(**pd.DataFrame(rows, index=frame.index))
+    frame = evidence.frame
+    by_ok = frame.sort_values("ok", ascending=False, kind="stable")
+    chosen = ~by_ok.duplicated(["place", "series"]).reindex(frame.index)
+    known = {
+        (of_surface, label): angles.below_one
+        for of_surface, seen in inspections.items()
+        for label, angles in seen.angles.items()
+    }
+    maps = zip(frame["mesh_hash"], frame["label"], chosen, strict=True)
+    return frame.assign(
+        policy=frame["solves"].map(evidence.policies.index),
+        chosen=chosen,
+        below_one=[known.get((place, label)) if one else None for place, label, one in maps],
+    )
 
 
 def known_names(evidence: Evidence) -> dict[str, Any]:
@@ -89,8 +80,7 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
     paper = evidence.paper
 
     def disk(key: str) -> TriangleMesh | None:
-        place = evidence.by_key[key].cell.mesh_hash
-        mesh = evidence.mesh(next(s for s in evidence.surfaces if s.mesh_hash == place))
+        mesh = evidence.mesh(evidence.by_hash[evidence.by_key[key].cell.mesh_hash])
         return mesh if mesh is not None and len(mesh.loops) == 1 else None
 
     return {

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +20,7 @@ from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
-from cembench.results.comparison import compare
+from cembench.results.comparison import Comparison, compare
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import Paper, papers, usual_paper
@@ -163,11 +162,12 @@ class Evidence:
         """The records as a frame, a row each, by surface, series and policy.
 
         Besides the columns of :attr:`frame_rows` it has `as_good`: about as good as the best map to
-        the disk there.
+        the disk there; and of the comparison with the reference's main parameters `comparison`,
+        `speedup` with its interval, `verdict`, `ratio`, and `paired`, the rounds with both.
         """
         import pandas as pd
 
-        frame = pd.DataFrame(self.frame_rows)
+        frame = pd.DataFrame([row | self._compared(row["key"]) for row in self.frame_rows])
         frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
         disks = frame[frame["ok"] & (frame["target"] == DISK)]
         best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
@@ -182,7 +182,8 @@ class Evidence:
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
         number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
-        model), `printed` (an algorithm of the paper), and `reference`.
+        model), `once` (the same, or of no model), `printed` (an algorithm of the paper), and
+        `reference`.
         """
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
@@ -196,6 +197,7 @@ class Evidence:
             more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
             more["model"], more["origin"] = surface.paper_row or None, surface.origin
             more["counted"] = surface in self.one_per_model
+            more["once"] = surface not in self.stand_ins_left_out
             more["printed"] = own.algorithm in self.paper.algorithms
             more["reference"] = own.algorithm == self.reference
             order = (place, k, self.policies.index(record.cell.solves))
@@ -219,7 +221,7 @@ class Evidence:
         """The difficulty of each surface that has a map to the disk, by its hash."""
         best, found = self.best_maps, {}
         for of_surface, key in best["key"][best["target"] == DISK].items():
-            mesh = self.mesh(next(s for s in self.surfaces if s.mesh_hash == of_surface))
+            mesh = self.mesh(self.by_hash[str(of_surface)])
             uv = self.uv(self.by_key[key])
             if mesh is not None and uv is not None and (one := difficulty(mesh, uv)):
                 found[str(of_surface)] = one
@@ -228,21 +230,18 @@ class Evidence:
     @cached_property
     def shapes(self) -> dict[str, Shape]:
         """What makes each surface's triangulation hard to map, by its hash, if it was saved."""
-        meshes = ((s.mesh_hash, self.mesh(s)) for s in self.surfaces)
-        return {key: shape(mesh) for key, mesh in meshes if mesh is not None}
+        meshes = {key: self.mesh(surface) for key, surface in self.by_hash.items()}
+        return {key: shape(mesh) for key, mesh in meshes.items() if mesh is not None}
 
     @cached_property
     def by_key(self) -> dict[str, Record]:
         """The records by the keys of their cells."""
         return {record.cell.key: record for record in self.records}
 
-    def origin_of(self, record: Record) -> MeshOrigin:
-        """Return the origin of a record's figures."""
-        return self._origins[record.cell.mesh_hash]
-
     @cached_property
-    def _origins(self) -> dict[str, MeshOrigin]:
-        return {surface.mesh_hash: surface.origin for surface in self.surfaces}
+    def by_hash(self) -> dict[str, MeasuredSurface]:
+        """The surfaces by the hashes of their meshes."""
+        return {surface.mesh_hash: surface for surface in self.surfaces}
 
     @cached_property
     def machines(self) -> Marks:
@@ -403,14 +402,32 @@ class Evidence:
         """Return a record as a flat row, compared with the reference."""
         return self.rows[record.cell.key]
 
-    def rate(self, record: Record) -> float | None:
-        """Return t / t_reference - 1 for a record's time t; None without both times.
+    @cached_property
+    def comparisons(self) -> dict[str, Comparison]:
+        """The comparisons of times with the reference, by key; none without both times.
 
-        It is the median ratio within rounds, for the reference with its main parameters on the same
-        surface and with the same policy.
+        It is the reference with its main parameters on the same surface and with the same policy.
         """
-        base = self.base(record)
-        found = None if base is None else compare(record, base)
+        pairs = ((record, self.base(record)) for record in self.records)
+        found = {one.cell.key: compare(one, base) for one, base in pairs if base is not None}
+        return {key: one for key, one in found.items() if one is not None}
+
+    def _compared(self, key: str) -> dict[str, Any]:
+        found = self.comparisons.get(key)
+        interval = found and found.speedup_interval
+        return {
+            "comparison": found,
+            "speedup": found and found.speedup,
+            "speedup_low": interval and interval.low,
+            "speedup_high": interval and interval.high,
+            "verdict": found and found.verdict,
+            "ratio": found and found.ratio,
+            "paired": found.rounds if found else 0,
+        }
+
+    def rate(self, record: Record) -> float | None:
+        """Return t / t_reference - 1 for a record's time t, the median ratio within rounds."""
+        found = self.comparisons.get(record.cell.key)
         return None if found is None else found.speedup
 
     def base(self, record: Record) -> Record | None:
@@ -455,12 +472,6 @@ class Evidence:
             why = f"it has {len(uv)} vertices, the record {record.mesh.vertices}"
             raise damaged(file, f"the map of {record.cell.label}", why)
         return uv
-
-
-def figure_of(record: Record, metric: str) -> float:
-    """Return a figure of a map; infinite if the cell did not end ok."""
-    found = record.outcome.metrics.get(metric)
-    return inf if record.outcome.status != "ok" or found is None else float(found)
 
 
 def model_surface(model: str) -> str:

@@ -185,7 +185,6 @@ def _angles(mesh: TriangleMesh, uv: NDArray[np.complex128], record: Record) -> A
 
 def angles_of(evidence: Evidence, record: Record) -> Angles | None:
     """Return the angles of a record's map; None if the run did not save it."""
-    surface = next(s for s in evidence.surfaces if s.mesh_hash == record.cell.mesh_hash)
     uv = evidence.uv(record)
-    mesh = None if uv is None else evidence.mesh(surface)
+    mesh = None if uv is None else evidence.mesh(evidence.by_hash[record.cell.mesh_hash])
     return None if mesh is None or uv is None else _angles(mesh, uv, record)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from cembench.report.by_surface import MEAN_RATIO, POLICIES, Quantity, table_beside
+from cembench.report.by_surface import POLICIES, policy_suffix
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.printed_tables import GEOMETRIC_RATE, MEAN_RATE, measured_rates
 from cembench.report.declared import declared_table
-from cembench.report.document import Column, Gap, Table, count, words
-from cembench.results.columns import COLUMNS, FrameColumn, counted
+from cembench.report.document import Gap, Table
+from cembench.results.columns import counted
 from cembench.results.frame import filled
-from cembench.results.records import Record
 
 REUSE, BACKSLASH = BOTH = tuple(POLICIES)
 
@@ -29,59 +27,6 @@ def one_policy_gap(evidence: Evidence) -> Gap:
     )
 
 
-def policies_table(evidence: Evidence) -> Table:
-    """Return a table of seconds under both policies and their ratio, for every algorithm."""
-    frame = evidence.frame
-    known = frame[frame["ok"]].pivot(
-        index=["mesh_hash", "label"], columns="solves", values="seconds"
-    )
-    ratios = (known[BACKSLASH] / known[REUSE]).dropna().to_dict()
-    quantities = []
-    for series in evidence.series:
-
-        def ratio(record: Record, label: str = series.label) -> float | None:
-            return ratios.get((record.cell.mesh_hash, label))
-
-        of_ratio = FrameColumn("ratio", ratio, form=".2f", lacking="not under both policies")
-        seconds = COLUMNS["seconds"]
-        quantities += [Quantity(series.label, series, seconds, title=p, policy=p) for p in BOTH]
-        quantities.append(Quantity(series.label, series, of_ratio, title="ratio", policy=REUSE))
-    return table_beside(
-        evidence,
-        "reuse-against-backslash",
-        "Seconds with factorisations reused (reuse) or repeated at every solve (backslash)",
-        evidence.surfaces,
-        quantities,
-        caption="The ratio shows what an implementation saves by reusing a factorisation, "
-        "whatever the algorithm. The paper's MATLAB code factored at every solve.",
-        footers=(MEAN_RATIO,),
-    )
-
-
-def speedups_table(evidence: Evidence) -> Table:
-    """Return a table of the reference's average rates of speedup under both policies."""
-    titles = ("mean rate", "geometric mean - 1", "n")
-    columns = [Column(title, policy) for policy in BOTH for title in titles]
-    rows, label = [], evidence.reference_label
-    for s in evidence.disk_series:
-        if s.algorithm == evidence.reference or not s.main:
-            continue
-        cells = [words(s.label)]
-        for policy in BOTH:
-            rates = list(measured_rates(evidence, s.algorithm, policy).values())
-            for mean in (MEAN_RATE, GEOMETRIC_RATE):
-                cells.append(mean.model_copy(update={"form": ".2f"}).entry(rates, "no rate"))
-            cells.append(count(len(rates)))
-        rows.append(tuple(cells))
-    return Table(
-        "speedup-by-policy",
-        f"Speedup of {label} under both policies: the algorithm, and the reuse of factorisations",
-        (Column(f"{label} over", numeric=False), *columns),
-        tuple(rows),
-        "Rates of speedup on the surfaces that are or stand in for models of the paper.",
-    )
-
-
 def work_tables(evidence: Evidence) -> list[Table]:
     """Return a table of factorisations and solves for each policy whose records hold counts."""
     tables = []
@@ -93,10 +38,17 @@ def work_tables(evidence: Evidence) -> list[Table]:
             made = declared_table(
                 evidence,
                 "linear-algebra-work",
-                keys=[record.cell.key for record in own],
+                policy=policy,
                 surfaces=evidence.surfaces,
                 notes=list(filter(None, told)),
                 called=f"linear-algebra-work-{policy}",
             )
             tables += [made] if made else []
     return tables
+
+
+def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
+    """Return a table on the certainty of the speedups; none without comparable rounds."""
+    called = f"sure-speedups{policy_suffix(policy, evidence)}"
+    made = declared_table(evidence, "sure-speedups", called=called, policy=policy)
+    return [made] if made else []

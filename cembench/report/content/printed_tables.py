@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import TYPE_CHECKING
 
 from cembench.report.by_surface import (
     MEAN_RATIO,
@@ -22,10 +23,13 @@ from cembench.report.by_surface import (
     table_beside,
 )
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
-from cembench.report.content.speedup_significance import sure_speedups
+from cembench.report.content.policies import sure_speedups
 from cembench.report.document import Column, Table, count, entry, missing, words
 from cembench.results.columns import COLUMNS, FrameColumn, worded
 from cembench.results.papers import Paper
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 #: The readings of an average of rates, the paper's own first and third.
 READINGS = (
@@ -191,11 +195,15 @@ def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
 
 def measured_rates(evidence: Evidence, algorithm: str, policy: str) -> dict[str, float]:
     """Return the rates of speedup over an algorithm by model, those of one surface for each."""
+    known = measured(evidence, algorithm, policy).dropna(subset="speedup")
+    return dict(zip(known["model"], known["speedup"], strict=True))
+
+
+def measured(evidence: Evidence, algorithm: str, policy: str) -> pd.DataFrame:
+    """Return the records of an algorithm on one surface for each model of the paper."""
     frame = evidence.frame
     rows = frame[frame["counted"] & frame["main"] & (frame["algorithm"] == algorithm)]
-    rows = rows[rows["solves"] == policy]
-    rates = (evidence.rate(evidence.by_key[key]) for key in rows["key"])
-    return {m: rate for m, rate in zip(rows["model"], rates, strict=True) if rate is not None}
+    return rows[rows["solves"] == policy]
 
 
 def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:

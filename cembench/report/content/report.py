@@ -11,13 +11,12 @@ from pathlib import Path
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import claims
-from cembench.report.content.evidence import Evidence, MeasuredSurface, figure_of
+from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.findings import findings, many_findings, surfaces_words
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
-from cembench.report.content.speedup_significance import sure_speedups
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
 from cembench.report.declared_plots import declared_plot
@@ -35,7 +34,7 @@ from cembench.report.document import (
     Text,
     words,
 )
-from cembench.report.plot_rows import exponents_table
+from cembench.report.plot_rows import exponents_table, printed
 from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
 from cembench.results.machines import machine_of, software_differences
@@ -281,7 +280,7 @@ def stand_ins_words(evidence: Evidence) -> str:
     if not standing:
         return ""
     thin = sum(s.non_delaunay_share > 0 for s in standing)
-    ratios = _energies_over_printed(evidence, standing)
+    ratios = _energies_over_printed(evidence)
     energy = (
         f"E_C by {evidence.reference.upper()} is {min(ratios):.2g} to {max(ratios):.2g} times the "
         "printed one, and "
@@ -297,34 +296,27 @@ def stand_ins_words(evidence: Evidence) -> str:
     )
 
 
-def _energies_over_printed(evidence: Evidence, surfaces: Sequence[MeasuredSurface]) -> list[float]:
-    """Return E_C by the reference over that printed for the model, where both are known."""
-    paper, series = evidence.paper, evidence.series_of(evidence.reference)
-    printed = {
-        s.paper_row: paper.tables[number][s.paper_row].get(one.printed.format(evidence.reference))
-        for number, table in paper.printed.items()
-        for one in table.figures
-        for s in surfaces
-        if one.column == "conformal_energy" and s.paper_row in paper.tables[number]
-    }
-    found = []
-    for surface in surfaces:
-        record = evidence.find(surface, series) if series else None
-        known = printed.get(surface.paper_row)
-        if record is not None and known and record.outcome.status == "ok":
-            found.append(figure_of(record, "conformal_energy") / known)
-    return found
+def _energies_over_printed(evidence: Evidence) -> list[float]:
+    """Return the stand-ins' E_C by the reference over that printed for the model, where known."""
+    in_print, frame = printed(evidence), evidence.frame
+    if "conformal_energy" not in in_print or in_print.empty:
+        return []
+    ours = frame[frame["ok"] & frame["reference"] & frame["main"] & (frame["origin"] == "stand-in")]
+    ours = ours.drop_duplicates("place").set_index("model")["conformal_energy"]
+    theirs = in_print[in_print["algorithm"] == evidence.reference].set_index("model")
+    ratios: list[float] = (ours / theirs["conformal_energy"].reindex(ours.index)).dropna().tolist()
+    return ratios
 
 
 def _tables(run: _Run) -> Section | None:
     """Return the paper's tables, each comparison of seconds with its averages and certainty."""
-    evidence, printed = run.evidence, run.evidence.paper.printed
+    evidence, tables = run.evidence, run.evidence.paper.printed
     items: list[Item] = []
-    for number in sorted(printed):
+    for number in sorted(tables):
         items += printed_tables(evidence, number)
-        if any(figure.column == "seconds" for figure in printed[number].figures):
+        if any(figure.column == "seconds" for figure in tables[number].figures):
             items += policies.work_tables(evidence)
-    numbers = sorted(number for number, table in printed.items() if table.figures)
+    numbers = sorted(number for number, table in tables.items() if table.figures)
     title = f"Tables {numbers[0]} to {numbers[-1]}" if numbers else ""
     return Section("tables", title, tuple(items)) if items else None
 
@@ -343,12 +335,12 @@ def _policies(run: _Run) -> list[Item]:
     """Return tables and a plot of both policies; empty if the run has one."""
     if not policies.has_both_policies(run.evidence):
         return []
-    made = (policies.policies_table(run.evidence), policies.speedups_table(run.evidence))
-    return [*made, *run.plots("reuse-against-backslash")]
+    tables = run.tables("reuse-against-backslash", "speedup-by-policy")
+    return [*tables, *run.plots("reuse-against-backslash")]
 
 
 def _certain(run: _Run) -> list[Item]:
-    return [t for policy in run.evidence.policies for t in sure_speedups(run.evidence, policy)]
+    return [t for p in run.evidence.policies for t in policies.sure_speedups(run.evidence, p)]
 
 
 def _beyond_the_paper(run: _Run) -> Section:

@@ -31,9 +31,7 @@ from markupsafe import Markup, escape
 from cembench.core.atomic import write_text
 from cembench.report.document import (
     ORIGINS,
-    SUSPECTS,
     Claim,
-    Column,
     Figure,
     Gallery,
     Item,
@@ -41,8 +39,8 @@ from cembench.report.document import (
     Section,
     Table,
     Value,
-    Verdict,
     csv_of,
+    groups_of,
     items_of,
 )
 from cembench.report.pictures import (
@@ -52,6 +50,7 @@ from cembench.report.pictures import (
     size_of,
     unreadable,
 )
+from cembench.report.render import templates
 
 #: The facets, each with the columns of a record whose values name a choice.
 FACETS: Mapping[str, tuple[str, ...]] = {
@@ -113,21 +112,12 @@ def _printed(records: Rows) -> dict[str, tuple[str, str, str]]:
 
 
 FILE = "index.html"
-#: The sign before each verdict, so that it does not rely on colour alone.
-SIGNS: Mapping[Verdict, str] = {
-    "does not hold here": "✗",
-    "holds in part": "◐",
-    "holds": "✓",
-    "too few rounds": "…",
-    "not tested here": "○",
-}
 #: Maximum bytes of embedded data of a figure or table; larger data is only linked.
 DATA_BYTES = 200_000
 #: Characters of a record's key in the page, more if they would not be unique.
 KEY = 12
 _ENCODED = json.JSONEncoder(default=str, ensure_ascii=False).encode
 _PIXELS = (".png", ".jpg", ".jpeg", ".webp")
-_TEMPLATES = Path(__file__).parents[1] / "templates"
 
 
 def write_html(report: Report, folder: Path) -> Path:
@@ -299,7 +289,7 @@ def _table(table: Table, keys: Mapping[str, str], anchor: str) -> Mapping[str, A
                 strict=True,
             )
         ],
-        "groups": _groups(table.columns),
+        "groups": groups_of(table.columns),
         "rows": rows[: len(body)],
         "footers": rows[len(body) :],
         "notes": [note for note in table.notes if note not in table.places.values()],
@@ -321,13 +311,6 @@ def _sortable(number: float | None) -> str:
 def _common_origin(values: Sequence[Value]) -> Any:
     found = {value.origin for value in values if value.number is not None}
     return found.pop() if len(found) == 1 else ""
-
-
-def _groups(columns: Sequence[Column]) -> list[tuple[str, int]]:
-    """Return the group headings with their numbers of columns; empty without groups."""
-    if not any(column.group for column in columns):
-        return []
-    return [(name, len(list(run))) for name, run in groupby(columns, lambda c: c.group)]
 
 
 def _letters(place: int) -> str:
@@ -460,26 +443,14 @@ def _words(value: Any) -> str:
 
 
 def environment() -> jinja2.Environment:
-    """Return the templates with their filters."""
-    environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader(_TEMPLATES),
-        autoescape=True,
-        undefined=jinja2.StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.filters |= {
+    """Return the templates with the filters of pages."""
+    found = templates.environment()
+    found.filters |= {
         "words": _prose,
         "stopped": lambda title: title if title.endswith((".", "?", "!")) else f"{title}.",
         "address": lambda file: quote(str(file)),
     }
-    environment.globals |= {
-        "ORIGINS": ORIGINS,
-        "SIGNS": SIGNS,
-        "SUSPECTS": SUSPECTS,
-        "Counter": Counter,
-    }
-    return environment
+    return found
 
 
 def _prose(words: str) -> Markup:
@@ -509,7 +480,7 @@ def policy(scripts: Sequence[bytes]) -> str:
 
 def template_text(name: str) -> str:
     """Return a part of the page that is not a template: style or script."""
-    return (_TEMPLATES / name).read_text()
+    return (templates.FOLDER / name).read_text()
 
 
 @cache
