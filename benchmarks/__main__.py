@@ -100,8 +100,17 @@ def main(arguments: Sequence[str]) -> None:
     for section in sections if write_docs else ():
         section.write(name)
         if section.page and section.page != STATES:
-            given = shlex.join(["python", "-m", "benchmarks", *arguments])
+            given = shlex.join(["python", "-m", "benchmarks", *map(without_folder, arguments)])
             record(f"{section.page} {name}", f"benchmarks/{name}.py", given, seconds)
+
+
+def without_folder(word: str) -> str:
+    """Return an argument for others: of a path outside the repository its name alone.
+
+    >>> [without_folder(word) for word in ("../meshes/face.obj@1", "--rounds", "reports/real")]
+    ['face.obj@1', '--rounds', 'reports/real']
+    """
+    return Path(word).name if word.startswith(("..", "/")) else word
 
 
 if __name__ == "__main__":

@@ -20,7 +20,7 @@ LAYOUT = f"""
     " | ".join(f"`{name}`" for name in ALGORITHMS)
 } |
 |---|{"---:|" * (3 + len(ALGORITHMS))}
-| {{surface}} | {{faces:,}} | {{holes}} | {{error:.3g}} | {
+| {{surface}} | {{faces:,}} | {{holes}} | {{error}} | {
     " | ".join(f"{{off[{name}]}}" for name in ALGORITHMS)
 } |"""
 
@@ -39,7 +39,7 @@ def hole_certificates(folders: Sequence[Path], *, faces: int = 50_000) -> Sectio
 
 def row(name: str, mesh: HoledMesh) -> dict[str, Any]:
     """Return what the bounds leave open, and how far each map's circles are off."""
-    registry, off, error = load_registry(), {}, float("nan")
+    registry, off, error = load_registry(), {}, "-"
     for algorithm in map(registry.algorithm, ALGORITHMS):
         try:
             z = algorithm.function(mesh.fresh(), **algorithm.arguments({})).uv
@@ -49,8 +49,8 @@ def row(name: str, mesh: HoledMesh) -> dict[str, Any]:
         except (AlgorithmFailed, NotPositiveDefinite):
             off[algorithm.name] = "none"
             continue
-        error = 100 * bounds.reciprocal_error
-        off[algorithm.name] = f"{100 * least:.2g} to {100 * most:.2g}"
+        error = percent(bounds.reciprocal_error)
+        off[algorithm.name] = f"{percent(least)} to {percent(most)}"
     return {
         "surface": name,
         "faces": mesh.m,
@@ -58,3 +58,13 @@ def row(name: str, mesh: HoledMesh) -> dict[str, Any]:
         "error": error,
         "off": off,
     }
+
+
+def percent(share: float) -> str:
+    """Return a share in percent with two digits.
+
+    >>> percent(0.00123), percent(0.5678), percent(12.345), percent(-1e-15)
+    ('0.12', '57', '1,234', '0.00')
+    """
+    number = 100 * max(share, 0.0)
+    return f"{number:.2f}" if number < 1 else f"{number:.1f}" if number < 10 else f"{number:,.0f}"
