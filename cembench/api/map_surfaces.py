@@ -215,6 +215,8 @@ def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
 
     try:
         found = certificate_of(mesh, uv, record.target)
-        return "only for maps to the disk" if found is None else found.words(uv[found.corners])
+        if found is None:
+            return "only for maps to the disk, with circular holes or without"
+        return found.words(uv[found.corners])
     except AlgorithmFailed as error:
         return f"none: {error}"

@@ -96,11 +96,8 @@ def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
     """Print the figures of a single mapped surface, and the files written."""
     from cembench.report.record_table import figures_table
 
-    out.print(figures_table(mapped.record, full=verbose))
-    if mapped.overlay:
-        print_pair("overlay", mapped.overlay)
-    if mapped.certificate:
-        print_pair("modulus", mapped.certificate)
+    words = (("overlay", mapped.overlay), ("certificate", mapped.certificate))
+    out.print(figures_table(mapped.record, full=verbose, more=words))
     for what, where in mapped.written.items():
         print_pair(what, where)
     if mapped.uv is not None and not mapped.written:

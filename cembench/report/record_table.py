@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
@@ -14,8 +14,13 @@ from cembench.results.papers import paper_of
 from cembench.results.records import Record
 
 
-def figures_table(record: Record, *, full: bool = True) -> Table:
-    """Return the figures of one record, one row each: all of them, or those most looked at."""
+def figures_table(
+    record: Record, *, full: bool = True, more: Iterable[tuple[str, str]] = ()
+) -> Table:
+    """Return the figures of one record, one row each: all of them, or those most looked at.
+
+    `more` are further rows, of a name and words each; those without words are left out.
+    """
     known, rows = _known(record), list[tuple[str, str]]()
     for line in own("record.toml")["lines"]:
         if line.get("in", "") == ("few" if full else "full"):
@@ -27,6 +32,7 @@ def figures_table(record: Record, *, full: bool = True) -> Table:
     rows += (("note", str(note)) for note in record.outcome.notes)
     if record.outcome.status == "ok" and needs_islands(record.outcome.metrics):
         rows.append(("note", ISLANDS))
+    rows += ((name, words) for name, words in more if words)
     return Table.of("record", "", [Column("", numeric=False)] * 2, rows)
 
 
