@@ -29,7 +29,7 @@ def hole_certificates(folders: Sequence[Path], *, faces: int = 50_000) -> Sectio
     """Measure by how much the capacities of holes differ from those of a map's circles, in percent.
 
     All surfaces with holes below some folders, of no more than `faces` triangles. A map whose holes
-    are not circles has no such figure, and one with folds proves nothing.
+    are not circles has no such figure. It is one of the circles alone: the map may have folds.
     """
     rows = [row(name, mesh) for name, mesh in progress(holed_below(folders, faces))]
     if not rows:

@@ -132,7 +132,7 @@ def write_together(
         mesh, corners = file.uncut or file.mesh, file.mesh.F if file.uncut else None
         soups.append(Soup.of_triangles(mesh.V, mesh.F, z, corners, name=file.mesh.name))
     if output.suffix.lower() != ".glb":
-        soups = [joined(soups)]
+        soups = [_joined(soups)]
     return _save(output, soups, np.concatenate(maps), options)
 
 
@@ -177,7 +177,7 @@ def _save(
         write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
     else:
         write_soup(output, soups[0], image)
-    return _folded_by_rounding(output, maps, joined(soups))
+    return _folded_by_rounding(output, maps, _joined(soups))
 
 
 def _obj_text(soup: Soup, source: Shells | None) -> str:
@@ -211,7 +211,7 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | No
     return baked_png(read_texture(options.bake), old, columns(soup.uv)[soup.uv_triangles])
 
 
-def joined(parts: Sequence[Soup]) -> Soup:
+def _joined(parts: Sequence[Soup]) -> Soup:
     """Return several surfaces joined into one mesh."""
     if len(parts) == 1:
         return parts[0]
