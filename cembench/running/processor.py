@@ -55,6 +55,7 @@ def before_call() -> Processor:
 
 def after_call() -> Processor:
     """Return the CPU seconds so far; other processes are read last, after this thread."""
+    thread_time()  # under a limit of CPU time (`ulimit -t`) Linux updates the process's clock by it
     process, thread = process_time(), thread_time()
     return Processor(thread, process, _of_children(), others_running())
 

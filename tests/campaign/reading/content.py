@@ -48,12 +48,17 @@ def integer(word: str) -> int:
 
 def real(word: str) -> float:
     """Return the number that a word is; neither NaN nor infinity is one."""
-    if not _REAL.fullmatch(word):
-        raise Damaged(f"{word[:40]!r} is not a number")
-    value = float(word)
+    value = rounded(word)
     if value in (float("inf"), float("-inf")):
         raise Damaged(f"{word[:40]!r} is too large")
     return value
+
+
+def rounded(word: str) -> float:
+    """Return the number that a word is as a double, infinite where it is too large for one."""
+    if not _REAL.fullmatch(word):
+        raise Damaged(f"{word[:40]!r} is not a number")
+    return float(word)
 
 
 def finite(value: float) -> float:

@@ -18,21 +18,30 @@ Table = list[tuple[float, ...]]
 
 
 def read_mat(data: bytes) -> Content:
-    """Read the variables v (n, 3) and f (m, 3), corners counted from 1."""
+    """Read v (n, 3) and f (m, 3), corners counted from 1, or the only two variables that fit."""
     # The text that opens level 5 has no zero in its first four bytes; a number of level 4 has.
     found = dict(_level_4(data) if 0 in data[:4] else _level_5(data))
-    if "v" not in found or "f" not in found:
-        raise Damaged("no variable v or no variable f")
+    v, f = ("v", "f") if {"v", "f"} <= set(found) else _only_pair(found)
     points, polygons = [], []
-    for row in found["v"]:
+    for row in found[v]:
         if len(row) != 3:
             raise Damaged(f"v has {len(row)} columns")
         points.append(tuple(finite(float(x)) for x in row))
-    for row in found["f"]:
+    for row in found[f]:
         if len(row) != 3 or any(finite(x) != int(x) for x in row):
             raise Damaged("f does not hold whole numbers in three columns")
         polygons.append(tuple(int(x) - 1 for x in row))
     return Content(points, polygons).checked()
+
+
+def _only_pair(found: dict[str, Table]) -> tuple[str, str]:
+    """Return the names of the only points with triangles whose corners run from 1 to the last."""
+    wide = {name: rows for name, rows in found.items() if rows and len(rows[0]) == 3}
+    spans = {name: {min(map(min, rows)), max(map(max, rows))} for name, rows in wide.items()}
+    pairs = [(v, f) for v in wide for f in wide if v != f and spans[f] == {1, len(wide[v])}]
+    if len(pairs) != 1:
+        raise Damaged("no variables v and f, and not exactly two others that fit")
+    return pairs[0]
 
 
 def _level_5(data: bytes) -> Iterator[tuple[str, Table]]:
@@ -89,9 +98,9 @@ def _matrix(data: bytes, order: str) -> tuple[str, Table] | None:
     (flags,) = struct.unpack_from(order + "I", parts[0][1])
     name = parts[2][1].decode("latin-1")
     dimensions = struct.unpack(f"{order}{len(parts[1][1]) // 4}i", parts[1][1])
-    if name not in ("v", "f"):
-        return None
     if flags & 0xFF not in _NUMERIC or flags & 0x0800 or len(dimensions) != 2:
+        if name not in ("v", "f"):
+            return None
         raise Damaged(f"{name} is not a matrix of real numbers")
     kind, body = parts[3]
     if kind not in _TYPES:

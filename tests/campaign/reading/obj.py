@@ -19,7 +19,7 @@ def read_obj(data: bytes) -> Content:
     points: list[Point] = []
     corners: list[list[int]] = []
     for line in re.split(r"\r\n|\r|\n", text):
-        words = re.split(r"[ \t]+", line.partition("#")[0].strip(" \t"))
+        words = re.split(r"[ \t\v\f]+", line.partition("#")[0].strip(" \t\v\f"))
         if words[0] == "v":
             if len(words) < 4:
                 raise Damaged(f"a vertex with {len(words) - 1} coordinates")

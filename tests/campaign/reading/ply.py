@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from tests.campaign.reading.content import Content, Damaged, finite, integer, real
+from tests.campaign.reading.content import Content, Damaged, finite, integer, rounded
 
 _SIZES = {
     **dict.fromkeys(("char", "int8"), "b"),
@@ -149,7 +149,7 @@ def _text(elements: list[_Element], body: bytes) -> dict[str, list[Row]]:
                 word = words.pop()
                 if _NOT_FINITE.fullmatch(word):  # no fault where nobody reads it, as in binary
                     return float(word)
-                return real(word) if _SIZES[kind] in "fd" else _within(kind, integer(word))
+                return rounded(word) if _SIZES[kind] in "fd" else _within(kind, integer(word))
 
             def room(words: list[str] = words) -> int:
                 return len(words)
@@ -190,6 +190,6 @@ def _binary(elements: list[_Element], body: bytes, order: str) -> dict[str, list
             raise Damaged(f"{element.count} of {element.name} in {len(body)} bytes")
         for _ in range(element.count if element.properties else 0):
             found[element.name].append(_row(element.properties, take, lambda: len(body) - at))
-    if at != len(body):
+    if body[at:].strip():
         raise Damaged(f"{len(body) - at} bytes are left over")
     return found
