@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.laplacian import corner_products
+from cembench.conformal.laplacian import double_areas
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.mesh.files import read_soup
@@ -100,7 +100,7 @@ class Shells:
 
 def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
     """Return the area of each surface, twice."""
-    return [float(corner_products(one.mesh.V, one.mesh.F)[1].sum()) for one in surfaces]
+    return [float(double_areas(one.mesh.V, one.mesh.F).sum()) for one in surfaces]
 
 
 def read_shells(

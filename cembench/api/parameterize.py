@@ -27,7 +27,8 @@ from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
 from cembench.running.map_checks import figures
 from cembench.running.measure import check_cell, check_overlay, refinement_of
-from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.plan import MeasurementSettings, cell_of, distribute_parameters
+from cembench.running.sources import sources_of
 from cembench.running.surfaces import SurfaceInput, load_surface
 
 if TYPE_CHECKING:
@@ -445,13 +446,14 @@ def parameterize(
     candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
-    task = plan_cells([chosen], [mesh], parameters, MeasurementSettings(repeats=1))[0]
+    arguments = distribute_parameters([chosen], parameters)[chosen.name]
+    cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))
     full = check == "full"
     if overlay:
         refinement_of(chosen)
-        outcome, mesh, z = check_overlay(chosen, task.mesh, task.cell, figures=full)
+        outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)
     else:
-        outcome, z = check_cell(chosen, task.mesh, task.cell, memory=False, figures=full)
+        outcome, z = check_cell(chosen, mesh, cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)

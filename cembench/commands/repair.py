@@ -65,7 +65,7 @@ def repair(
                 "vertices": surface.n,
                 "faces": surface.m,
                 "boundary_loops": len(surface.loops),
-                "genus": genus(surface.F, surface.n, len(surface.loops)),
+                "genus": genus(surface.F, surface.n, surface.loops),
                 "output": str(path),
             }
         )

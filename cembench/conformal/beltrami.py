@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import corner_products, half_cotangents, laplacian_of_weights
+from cembench.conformal.laplacian import double_areas, half_cotangents, laplacian_of_weights
 from cembench.conformal.planar import signed_areas
 from cembench.core.blocks import in_blocks
 from cembench.core.clock import phase
@@ -55,7 +55,7 @@ def _dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> N
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-        root = corner_products(V, F)[1] / (2 * np.abs(area))
+        root = double_areas(V, F) / (2 * np.abs(area))
         whole = E + G + 2 * root
         modulus = np.hypot(E - G, 2 * mixed) / whole
         found = (1 + modulus) ** 2 * whole / (4 * root)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import edge_lengths
-from cembench.core.blocks import in_blocks
+from cembench.conformal.laplacian import double_areas
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -33,14 +33,9 @@ def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) ->
     elif gauge == "triangle":
         measure[middle_triangle(mesh.V, mesh.F)] = 1
     else:
-        area = in_blocks(lambda some: _double_areas(mesh.V, some), mesh.F)
-        measure[:] = np.bincount(mesh.F.ravel(), weights=np.repeat(area, 3), minlength=mesh.n)
+        area = np.repeat(double_areas(mesh.V, mesh.F), 3)
+        measure[:] = np.bincount(mesh.F.ravel(), weights=area, minlength=mesh.n)
     return measure / measure.sum()
-
-
-def _double_areas(V: Real, F: NDArray[np.int64]) -> Real:
-    a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
-    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
 
 def moved_to_gauge(uv: Complex, measure: Real) -> Complex:

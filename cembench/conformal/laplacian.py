@@ -11,7 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay, opposite_to_obtuse
-from cembench.core.blocks import blocks
+from cembench.core.blocks import blocks, in_blocks
 from cembench.core.clock import phase
 from cembench.mesh.gluing import SLOTS, opposite_edge_ends, twins_of_half_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -45,15 +45,22 @@ def _products(
     for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
         np.einsum("td,td->t", p, q, out=dots[:, k])
     np.negative(dots, out=dots)
+    return dots, _double_areas(e1, e2)
+
+
+def double_areas(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Return twice the area of each triangle (m,), unsigned; V is (n, 2 or 3)."""
+    return in_blocks(lambda some: _double_areas(*_opposite_edges(V, some)[1:]), F)
+
+
+def _double_areas(e1: NDArray[np.float64], e2: NDArray[np.float64]) -> NDArray[np.float64]:
     # Lagrange's identity through the dot products alone would cancel on slivers.
-    if e0.shape[1] == 2:
-        double_area = np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
-    else:
-        x = e1[:, 1] * e2[:, 2] - e1[:, 2] * e2[:, 1]
-        y = e1[:, 2] * e2[:, 0] - e1[:, 0] * e2[:, 2]
-        z = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
-        double_area = np.sqrt(x * x + y * y + z * z)
-    return dots, double_area
+    if e1.shape[1] == 2:
+        return np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
+    x = e1[:, 1] * e2[:, 2] - e1[:, 2] * e2[:, 1]
+    y = e1[:, 2] * e2[:, 0] - e1[:, 0] * e2[:, 2]
+    z = e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0]
+    return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
 def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:

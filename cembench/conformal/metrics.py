@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.beltrami import dilatations as dilatations_between
 from cembench.conformal.gauge import gauge_measure, moved_to_gauge
-from cembench.conformal.laplacian import corner_products, half_cotangents
+from cembench.conformal.laplacian import corner_products, double_areas, half_cotangents
 from cembench.conformal.planar import (
     fitted_circle,
     folded_triangles,
@@ -100,7 +100,10 @@ def _coordinates(points: Real | Complex) -> Real:
 
 
 def _angles(V: Real, F: NDArray[np.int64]) -> Real:
-    dots, double_area = corner_products(V, F)
+    return _in_degrees(*corner_products(V, F))
+
+
+def _in_degrees(dots: Real, double_area: Real) -> Real:
     return np.asarray(np.rad2deg(np.arctan2(double_area[:, None], dots)))
 
 
@@ -192,7 +195,7 @@ def boundary_circularity(mesh: TriangleMesh, uv: Complex) -> float:
 
 def surface_areas(mesh: TriangleMesh) -> Real:
     """Return the area of each triangle of the surface, shape (m,)."""
-    return corner_products(mesh.V, mesh.F)[1] / 2
+    return double_areas(mesh.V, mesh.F) / 2
 
 
 def is_disk_map(mesh: TriangleMesh, uv: Complex) -> bool:
@@ -257,9 +260,19 @@ class MapFigures:
         """Areas of the triangles of the surface, (m,)."""
         return self.products[1] / 2
 
-    def _energy(self, uv: Complex) -> float:
+    @cached_property
+    def half_cotangents(self) -> Real:
+        """Half the cotangents of the corners of the surface, (m, 3)."""
         dots, double_area = self.products
-        return _energy_of_weights(dots / (2 * double_area[:, None]), self.mesh.F, uv)
+        return dots / (2 * double_area[:, None])
+
+    @cached_property
+    def surface_angles(self) -> Real:
+        """Angles of the triangles of the surface in degrees, (m, 3)."""
+        return _in_degrees(*self.products)
+
+    def _energy(self, uv: Complex) -> float:
+        return _energy_of_weights(self.half_cotangents, self.mesh.F, uv)
 
     @cached_property
     def energy(self) -> float:
@@ -279,7 +292,11 @@ class MapFigures:
     @cached_property
     def angle_errors(self) -> Real:
         """Absolute change of every corner's angle in degrees, (m, 3)."""
-        return angle_errors(self.mesh, self.uv)
+        return self.angle_errors_of(self.uv)
+
+    def angle_errors_of(self, uv: Complex) -> Real:
+        """Return the same, (m, 3), for any map of the surface."""
+        return np.abs(self.surface_angles - corner_angles(uv, self.mesh.F))
 
     @cached_property
     def dilatations(self) -> Real:

@@ -15,6 +15,8 @@ from scipy import special
 from scipy.spatial import Delaunay
 
 from cembench.core.errors import ParameterError
+from cembench.core.wording import Setting
+from cembench.mesh.defects import degenerate
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 Real = NDArray[np.float64]
@@ -105,7 +107,7 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh,
     Raises
     ------
     ParameterError
-        The side is out of range, or the map is not onto the disk.
+        The side is out of range or too large for the surface, or the map is not onto the disk.
 
     """
     _check_side(side)
@@ -123,6 +125,14 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh,
     F[clockwise] = F[clockwise, ::-1]
     face, weights = locate(z, mesh.F, points, nearest=True)
     V = interpolated(weights, mesh.V[mesh.F[face]])
+    if flat := np.count_nonzero(degenerate(V, F)):
+        raise ParameterError.about(
+            "{given} is too many for this surface: {flat:,} new triangles have no area. Take as "
+            "many as its boundary has room for, e.g. {fewer}.",
+            given=Setting("side", str(side)),
+            flat=flat,
+            fewer=Setting("side", str(max(4, min(side - 1, len(mesh.loops[0]) // 3)))),
+        )
     return DiskMesh.from_arrays(V, F, name=mesh.name), points
 
 

@@ -336,7 +336,7 @@ def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
     """
     coordinates = np.ascontiguousarray(V.T)
     for block in blocks(len(F)):
-        yield block, coordinates[:, np.ascontiguousarray(F[block].T)]
+        yield block, coordinates.take(np.ascontiguousarray(F[block].T), axis=1)
 
 
 def out_of_scale(V: Points, F: Indices) -> Problem | None:

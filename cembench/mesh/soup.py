@@ -105,7 +105,7 @@ class Soup:
             raise MeshError(
                 f"no faces: {len(V)} vertices were found, but not one triangle or polygon. The "
                 "file holds a point cloud, was cut short, or is of another format than its name "
-                "says."
+                "says; export or download it again, as a surface."
             )
         small = np.flatnonzero(sizes < 3)
         if len(small):

@@ -7,6 +7,8 @@ F is an int64 (m, 3) array of vertex indices. Half-edge ``c`` of face ``t`` runs
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -59,13 +61,13 @@ def euler_characteristic(F: Faces, n: int) -> int:
     return n - len(undirected_edges(F)[0]) + len(F)
 
 
-def genus(F: Faces, n: int, loops: int) -> int:
-    """Return the genus of a connected oriented surface with `loops` boundary loops.
+def genus(F: Faces, n: int, loops: Sequence[Faces]) -> int:
+    """Return the genus of a connected oriented surface with these boundary loops.
 
     Each of its E edges has two half-edges, or one on the boundary, so no edges need be sorted.
     """
-    edges = (F.size + len(boundary_half_edges(F, n))) // 2
-    return (2 - loops - (n - edges + len(F))) // 2
+    edges = (F.size + sum(map(len, loops))) // 2
+    return (2 - len(loops) - (n - edges + len(F))) // 2
 
 
 def boundary_half_edges(F: Faces, n: int) -> Faces:

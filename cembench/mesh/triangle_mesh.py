@@ -34,6 +34,9 @@ from cembench.mesh.defects import (
 )
 from cembench.mesh.repair import repair
 
+#: Boundary loops, each as its vertices in order.
+Loops = Sequence[NDArray[np.int64]]
+
 
 @dataclass(frozen=True, eq=False, init=False)
 class TriangleMesh:
@@ -92,8 +95,9 @@ class TriangleMesh:
         F, remarks, problems = examine(V, F, connected=kind is not TriangleMesh)
         if problems:
             raise UnusableMeshError([*problems, *_problems_when_repaired(kind, V, F, problems)])
+        loops = topology.boundary_loops(F, len(V))
         try:
-            notices += remarks + kind._check_topology(V, F)
+            notices += remarks + kind._check_topology(V, F, loops)
         except UnusableMeshError as error:
             open_seams = coincident(V)
             raise UnusableMeshError(
@@ -102,6 +106,7 @@ class TriangleMesh:
         V.setflags(write=False)
         F.setflags(write=False)
         self._set(V, F, printable(name), notices)
+        self.__dict__["loops"] = tuple(loops)
 
     def _set(
         self, V: NDArray[np.float64], F: NDArray[np.int64], name: str, notices: tuple[Notice, ...]
@@ -138,7 +143,9 @@ class TriangleMesh:
         return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
+    def _check_topology(
+        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
+    ) -> tuple[Notice, ...]:
         """Raise if the surface is not of this class; return notices for the user."""
         return ()
 
@@ -217,9 +224,11 @@ class DiskMesh(TriangleMesh):
         return self.loops[0]
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-        loops = _checked_loops(V, F)
-        problems = _handles(F, len(V), len(loops))
+    def _check_topology(
+        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
+    ) -> tuple[Notice, ...]:
+        _refuse_closed(F, len(V), loops)
+        problems = _handles(F, len(V), loops)
         if len(loops) > 1:
             problems.insert(0, _holes(V, loops))
         if problems:
@@ -308,9 +317,11 @@ class HoledMesh(TriangleMesh):
         return loops.pop(chosen[0]), tuple(loops)
 
     @classmethod
-    def _check_topology(cls, V: NDArray[np.float64], F: NDArray[np.int64]) -> tuple[Notice, ...]:
-        loops = _checked_loops(V, F)
-        problems = _handles(F, len(V), len(loops))
+    def _check_topology(
+        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
+    ) -> tuple[Notice, ...]:
+        _refuse_closed(F, len(V), loops)
+        problems = _handles(F, len(V), loops)
         if len(loops) == 1:
             text = (
                 "the surface has a single boundary loop; this needs an outer boundary and at least "
@@ -340,7 +351,8 @@ def _problems_when_repaired(
     if any(problem.remedy is Remedy.rescale for problem in known):
         return ()
     try:
-        kind._check_topology(*repair(V, F).surfaces[0])
+        V, F = repair(V, F).surfaces[0]
+        kind._check_topology(V, F, topology.boundary_loops(F, len(V)))
     except UnusableMeshError as error:
         return error.problems
     except MeshError:  # nothing would be left of it, so only its own defects are reported
@@ -348,17 +360,15 @@ def _problems_when_repaired(
     return ()
 
 
-def _checked_loops(V: NDArray[np.float64], F: NDArray[np.int64]) -> list[NDArray[np.int64]]:
-    """Return the boundary loops of a surface; :class:`UnusableMeshError` if there are none."""
-    loops = topology.boundary_loops(F, len(V))
+def _refuse_closed(F: NDArray[np.int64], n: int, loops: Loops) -> None:
+    """Raise :class:`UnusableMeshError` if a surface has no boundary loop."""
     if not loops:
         text = "the surface is closed: it has no boundary loop, and a map to the disk needs one"
         closed = Problem(Defect.closed, 1, text)
-        raise UnusableMeshError([closed, *_handles(F, len(V), 0)])
-    return loops
+        raise UnusableMeshError([closed, *_handles(F, n, loops)])
 
 
-def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
+def _holes(V: NDArray[np.float64], loops: Loops) -> Problem:
     """Return the problem that a surface has several boundary loops."""
     sizes = sorted(map(len, loops), reverse=True)
     lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
@@ -373,30 +383,26 @@ def _holes(V: NDArray[np.float64], loops: list[NDArray[np.int64]]) -> Problem:
     )
 
 
-def _handles(F: NDArray[np.int64], n: int, loops: int) -> list[Problem]:
+def _handles(F: NDArray[np.int64], n: int, loops: Loops) -> list[Problem]:
     """Return the problem that a surface has handles, if it has."""
     genus = topology.genus(F, n, loops)
     if not genus:
         return []
-    euler = 2 - 2 * genus - loops
+    count = len(loops)
     text = (
-        f"the surface has genus {genus} (Euler characteristic {euler} with {loops} boundary "
-        f"loop(s); allowed is {2 - loops}, genus 0): it has {genus} handle(s) like a torus"
+        f"the surface has genus {genus} (Euler characteristic {2 - 2 * genus - count} with {count} "
+        f"boundary loop(s); allowed is {2 - count}, genus 0): it has {genus} handle(s) like a torus"
     )
     return [Problem(Defect.handles, genus, text)]
 
 
-def definition_1_notices(
-    F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
-) -> tuple[Notice, ...]:
+def definition_1_notices(F: NDArray[np.int64], n: int, loops: Loops) -> tuple[Notice, ...]:
     """Return notices on where the mesh breaks the paper's Definition 1 (well-conditioned)."""
     broken = _breaks_of_definition_1(F, n, loops)
     return tuple(Notice(NoticeKind.DEFINITION_1, f"Definition 1 {where}") for where in broken)
 
 
-def _breaks_of_definition_1(
-    F: NDArray[np.int64], n: int, loops: Sequence[NDArray[np.int64]]
-) -> Iterator[str]:
+def _breaks_of_definition_1(F: NDArray[np.int64], n: int, loops: Loops) -> Iterator[str]:
     """Yield a text for each condition of Definition 1 that the mesh breaks."""
     inside = np.ones(n, dtype=bool)
     inside[np.concatenate(loops)] = False

@@ -20,8 +20,11 @@ from pydantic import BaseModel
 
 from cembench.conformal.atlas import atlas_metrics
 from cembench.conformal.metrics import (
+    METRICS,
+    MapFigures,
     all_metrics,
     boundary_circles,
+    computed,
     dirichlet_energy,
     image_area,
     lost_in_rounding,
@@ -203,17 +206,17 @@ def _judged(
     """Return the fields of an outcome for a map, and the faults."""
     with _warnings_ignored():
         problems = faults(promise, mesh, uv)
-        metrics = _metrics(promise.target, mesh, uv)
-        finite = {name: _finite(value) for name, value in metrics.items()}
         if promise.target == "atlas":
+            metrics = atlas_metrics(mesh, uv.reshape(-1, 3))
             notes = [] if problems else lost_in_rounding(metrics)
-            return {"metrics": finite, "notes": tuple(notes)}, problems
+            return {"metrics": _all_finite(metrics), "notes": tuple(notes)}, problems
+        of_map = MapFigures(mesh, uv)
+        metrics = computed(METRICS, of_map)
         notes = [] if problems else [*remarks(promise, mesh, uv), *lost_in_rounding(metrics)]
         if not problems:
-            error = float(metrics["angle_error_mean_deg"])
-            notes += quality_notes(promise.target, mesh, uv, extras, error)
+            notes += quality_notes(promise.target, of_map, extras)
         about = {
-            "metrics": finite,
+            "metrics": _all_finite(metrics),
             "boundaries": _boundaries(mesh, uv),
             "notes": tuple(notes),
         }
@@ -223,11 +226,14 @@ def _judged(
 def figures(target: str, mesh: TriangleMesh, uv: Complex) -> dict[str, float | None]:
     """Return the metrics of a map to a target, by name; None for one that is not finite."""
     with _warnings_ignored():
-        return {name: _finite(value) for name, value in _metrics(target, mesh, uv).items()}
+        atlas = target == "atlas"
+        return _all_finite(
+            atlas_metrics(mesh, uv.reshape(-1, 3)) if atlas else all_metrics(mesh, uv)
+        )
 
 
-def _metrics(target: str, mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
-    return atlas_metrics(mesh, uv.reshape(-1, 3)) if target == "atlas" else all_metrics(mesh, uv)
+def _all_finite(metrics: Mapping[str, float]) -> dict[str, float | None]:
+    return {name: _finite(value) for name, value in metrics.items()}
 
 
 @contextmanager

@@ -128,20 +128,31 @@ def plan_cells(
         settings = paper_of(model).as_printed(model, algorithms) | dict(parameters)
         arguments = distribute_parameters(algorithms, settings)
         for taker in takers:
-            cell = Cell(
-                algorithm=taker.name,
-                parameters=arguments[taker.name],
-                code_hash=hash_of(sources[taker.name]),
-                mesh=mesh.name,
-                mesh_hash=mesh.hash,
-                solves=how.solves,
-                backend=how.backend,
-                threads=how.threads,
-                repeats=how.repeats,
-                precision=how.precision,
-            )
+            cell = cell_of(taker, mesh, arguments[taker.name], how, sources[taker.name])
             tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), sources[taker.name]))
     return tasks
+
+
+def cell_of(
+    algorithm: Algorithm,
+    mesh: TriangleMesh,
+    arguments: Mapping[str, Any],
+    how: MeasurementSettings,
+    sources: Mapping[str, str],
+) -> Cell:
+    """Return the cell of an algorithm, with its checked keyword arguments, on a surface."""
+    return Cell(
+        algorithm=algorithm.name,
+        parameters=dict(arguments),
+        code_hash=hash_of(sources),
+        mesh=mesh.name,
+        mesh_hash=mesh.hash,
+        solves=how.solves,
+        backend=how.backend,
+        threads=how.threads,
+        repeats=how.repeats,
+        precision=how.precision,
+    )
 
 
 def distribute_parameters(

@@ -22,8 +22,8 @@ from cembench.conformal.filled_start import arcs_of_measure, widest_start
 from cembench.conformal.free_boundary import pinned_map, two_distant_vertices
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
-from cembench.conformal.laplacian import by_rows, laplacian
-from cembench.conformal.metrics import angle_errors, corner_angles, flipped_triangles
+from cembench.conformal.laplacian import by_rows, laplacian, laplacian_of_weights
+from cembench.conformal.metrics import MapFigures, angle_errors, flipped_triangles
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
@@ -49,13 +49,9 @@ CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 BETTER = 0.9
 
 
-def quality_notes(
-    target: str, mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any], error: float
-) -> list[Notice]:
-    """Return remarks on a valid map that is far from conformal; empty for others.
-
-    `error` is its mean angle error in degrees.
-    """
+def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -> list[Notice]:
+    """Return remarks on a valid map that is far from conformal; empty for others."""
+    mesh, uv, error = figures.mesh, figures.uv, float(figures.angle_errors.mean())
     notes = _last_resort(mesh, extras, error)
     if extras.get("stopped") == "crowded":
         message = (
@@ -65,10 +61,10 @@ def quality_notes(
         notes.append(Notice(NoticeKind.CROWDED_BOUNDARY, message))
     if target not in ("disk", "circular holes") or error <= CLOSE:
         return notes
-    known = yardstick(target, mesh, uv)
-    reachable = np.inf if known is None else float(angle_errors(mesh, known).mean())
+    known = yardstick(target, figures)
+    reachable = np.inf if known is None else float(figures.angle_errors_of(known).mean())
     free = free_error(mesh) if error > COMPARED else np.inf
-    most = FAR * reachable, FAR_FROM_FREE * free, COLLAPSED * collapsed_error(mesh), POOR
+    most = FAR * reachable, FAR_FROM_FREE * free, COLLAPSED * collapsed_error(figures), POOR
     if error <= min(most):
         return notes
     causes = "; ".join(likely_causes(mesh, uv, extras))
@@ -139,13 +135,13 @@ def better_parameters(
     return [Notice(NoticeKind.BETTER_PARAMETERS, message)]
 
 
-def collapsed_error(mesh: TriangleMesh) -> float:
+def collapsed_error(figures: MapFigures) -> float:
     """Return the mean angle error of a map that collapses all triangles, in degrees.
 
     A collapsed triangle has the angles 0, 0 and 180 degrees, so its mean error is two thirds of
     what its largest angle lacks to 180.
     """
-    largest = corner_angles(mesh.V, mesh.F).max(axis=1)
+    largest = figures.surface_angles.max(axis=1)
     return float((180 - largest).mean()) * 2 / 3
 
 
@@ -179,14 +175,15 @@ def free_error(mesh: TriangleMesh) -> float:
     return np.inf if flipped_triangles(mesh, uv) else float(angle_errors(mesh, uv).mean())
 
 
-def yardstick(target: str, mesh: TriangleMesh, uv: Complex) -> Complex | None:
+def yardstick(target: str, figures: MapFigures) -> Complex | None:
     """Return the map (n,) of the same target to compare with; None if there is none.
 
-    For a surface with holes, it has the same outer boundary as `uv`.
+    For a surface with holes, it has the same outer boundary as the map of the figures.
     """
+    mesh, uv = figures.mesh, figures.uv
     try:
         if target == "disk" and isinstance(mesh, DiskMesh):
-            return _by_harmonic_measure(mesh)
+            return _by_harmonic_measure(mesh, figures.half_cotangents)
         if target == "circular holes" and isinstance(mesh, HoledMesh):
             return _by_filled_start(mesh, max(mesh.loops, key=lambda loop: polygon_area(uv[loop])))
     except AlgorithmFailed:
@@ -194,8 +191,9 @@ def yardstick(target: str, mesh: TriangleMesh, uv: Complex) -> Complex | None:
     return None
 
 
-def _by_harmonic_measure(mesh: DiskMesh) -> Complex:
-    L, i, b = by_rows(laplacian(mesh)), mesh.interior, mesh.boundary
+def _by_harmonic_measure(mesh: DiskMesh, half_cotangents: NDArray[np.float64]) -> Complex:
+    L = by_rows(laplacian_of_weights(mesh.F, half_cotangents, mesh.n))
+    i, b = mesh.interior, mesh.boundary
     if not len(i):
         raise AlgorithmFailed("the mesh has no interior vertex")
     L_bi, inside = L[b][:, i], Cholesky(L[i][:, i].tocsc())

@@ -7,7 +7,12 @@ from cembench.algorithms.direct_cem.opened import opened_disk, valid_with_holes
 from cembench.surfaces.sheets import catenoid_ring
 
 from cembench import HoledMesh
-from cembench.conformal.metrics import boundary_circles, boundary_circularity, flipped_triangles
+from cembench.conformal.metrics import (
+    MapFigures,
+    boundary_circles,
+    boundary_circularity,
+    flipped_triangles,
+)
 from cembench.conformal.planar import crossing_polygons
 from cembench.core.notices import NoticeKind
 from cembench.running.quality import quality_notes
@@ -65,7 +70,7 @@ def test_a_wrecked_map_is_replaced_and_the_note_tells():
     assert is_valid(mesh, uv)
     assert extras["last_resort"] == {"opened_holes": 3}
     assert extras["folded_before_repair"] == mesh.m
-    note = quality_notes("circular holes", mesh, uv, extras, 1.0)[0]
+    note = quality_notes("circular holes", MapFigures(mesh, uv), extras)[0]
     assert note.kind is NoticeKind.LAST_RESORT
     assert "3 circles were cut out" in note.text
     kept, _ = valid_with_holes(mesh, (outer, *holes), wrecked, repair=True, last_resort=False)

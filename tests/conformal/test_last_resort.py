@@ -12,7 +12,7 @@ from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import LEAST_ARC, valid_map
-from cembench.conformal.metrics import angle_errors, flipped_triangles, is_disk_map
+from cembench.conformal.metrics import MapFigures, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
 from cembench.core.notices import NoticeKind
 from cembench.running.quality import quality_notes
@@ -51,8 +51,7 @@ def test_an_own_failure_is_recorded_and_told():
     mesh = long_band()
     found = bff(mesh)
     assert "too crowded" in found.extras["failure"]
-    error = float(angle_errors(mesh, found.uv).mean())
-    note = quality_notes("disk", mesh, found.uv, found.extras, error)[0]
+    note = quality_notes("disk", MapFigures(mesh, found.uv), found.extras)[0]
     assert note.kind is NoticeKind.LAST_RESORT
     assert "too crowded" in note.text
     assert "abf-linear" in note.text

@@ -118,6 +118,15 @@ def test_a_side_out_of_range_is_refused(cap, side):
         geometry_image(*cap, side)
 
 
+def test_more_samples_than_a_surface_has_room_for_are_refused_with_a_number_that_works():
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(4, 5))
+    z = load_registry().algorithm("direct-cem").function(mesh).uv
+    with pytest.raises(ParameterError, match="side=129 is too many") as refused:
+        regular_remesh(mesh, z, 129)
+    fewer = int(str(refused.value).rpartition("side=")[2].rstrip("."))
+    assert regular_remesh(mesh, z, fewer)[0].m >= mesh.m
+
+
 def test_a_map_that_is_not_onto_the_disk_is_refused(cap):
     mesh, z = cap
     with pytest.raises(ParameterError, match="off the unit circle by up to 1"):

@@ -15,7 +15,7 @@ from cembench.surfaces.spherical_cap import spherical_cap
 
 import cembench
 from cembench import DiskMesh
-from cembench.conformal.metrics import angle_errors
+from cembench.conformal.metrics import MapFigures, angle_errors
 from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.triangle_mesh import HoledMesh, TriangleMesh
 from cembench.registry import load_registry
@@ -54,11 +54,14 @@ def eared_disk(count=15):
 @pytest.mark.parametrize("mesh", [hemi_ellipsoid(800, x=2.0), flat_disk(600, stretch=4.0)])
 def test_the_yardstick_is_nearly_as_good_as_the_best_method(mesh):
     best = angle_errors(mesh, direct_cem(mesh).uv).mean()
-    assert angle_errors(mesh, yardstick("disk", mesh, direct_cem(mesh).uv)).mean() < 1.5 * best
+    assert (
+        angle_errors(mesh, yardstick("disk", MapFigures(mesh, direct_cem(mesh).uv))).mean()
+        < 1.5 * best
+    )
 
 
 def notes_on(target, mesh, uv, extras):
-    return quality_notes(target, mesh, uv, extras, angle_errors(mesh, uv).mean())
+    return quality_notes(target, MapFigures(mesh, uv), extras)
 
 
 @pytest.mark.parametrize("algorithm", [cem, direct_cem])
@@ -87,7 +90,7 @@ def test_with_holes_the_yardstick_has_the_same_boundary_outside():
     assert notes_on("circular holes", mesh, found.uv, found.extras) == []
     hole = mesh.outer_and_holes()[1][0]
     turned = harmonic_filled(mesh, outer=int(hole[0])).uv
-    known = yardstick("circular holes", mesh, turned)
+    known = yardstick("circular holes", MapFigures(mesh, turned))
     assert abs(abs(known[hole]) - 1).max() < 1e-12
 
 
@@ -143,7 +146,9 @@ def test_causes_are_those_of_the_mesh_and_of_the_map():
 def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_better(monkeypatch):
     mesh = flat_disk(200)
     flat = mesh.V[:, 0] + 1e-3j * mesh.V[:, 1]
-    assert angle_errors(mesh, flat).mean() == pytest.approx(collapsed_error(mesh), rel=0.3)
+    assert angle_errors(mesh, flat).mean() == pytest.approx(
+        collapsed_error(MapFigures(mesh, flat)), rel=0.3
+    )
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
     monkeypatch.setattr("cembench.running.quality.free_error", lambda _: np.inf)
     (note,) = notes_on("disk", mesh, flat, {})
@@ -190,4 +195,4 @@ def test_the_free_map_of_a_flat_surface_with_holes_is_itself():
 
 def test_a_free_boundary_has_no_yardstick():
     mesh = flat_disk(200)
-    assert yardstick("free boundary", mesh, mesh.V[:, 0] + 0j) is None
+    assert yardstick("free boundary", MapFigures(mesh, mesh.V[:, 0] + 0j)) is None
