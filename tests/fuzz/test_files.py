@@ -71,7 +71,8 @@ def test_the_independent_reader_knows_damage(suffix, text):
         READERS[suffix](text.encode())
 
 
-PLY = """ply   \nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z
+PLY = """ply   \nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y
+property float z
 property uchar red\nelement face 1\nproperty list uchar int vertex_indices\nproperty float quality
 end_header\n0 0 0 300\n1 0 0 1.5\n0 1 0 nan\n3 0 1 2 1e400\n"""
 
