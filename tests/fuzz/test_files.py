@@ -71,6 +71,27 @@ def test_the_independent_reader_knows_damage(suffix, text):
         READERS[suffix](text.encode())
 
 
+PLY = """ply   \nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y
+property float z
+property uchar red\nelement face 1\nproperty list uchar int vertex_indices\nproperty float quality
+end_header\n0 0 0 300\n1 0 0 1.5\n0 1 0 nan\n3 0 1 2 1e400\n"""
+
+
+@pytest.mark.parametrize(
+    ("suffix", "text"),
+    [
+        (".obj", SQUARE.replace("v 1 0 0", "v\t1\v0\f0")),
+        (".off", "COFF\n3 1 0\n0 0 0 1\n1 0 0 nan\n0 1 0 1e400\n3 0 1 2 -inf\n"),
+        (".ply", PLY),
+    ],
+)
+def test_what_nobody_reads_and_any_white_space_is_no_damage(suffix, text, tmp_path):
+    path = tmp_path / f"a{suffix}"
+    path.write_text(text)
+    read = judge_file(path, lambda path: read_mesh(path, TriangleMesh), legal=True)
+    assert (read.outcome, read.fault) == ("mesh", None)
+
+
 def reading(change=lambda V, F: (V, F)):
     """A reader that is right but for a change."""
 

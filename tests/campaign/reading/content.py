@@ -8,6 +8,7 @@ from dataclasses import dataclass
 Point = tuple[float, ...]
 
 _INTEGER = re.compile(r"[+-]?[0-9]+")
+_NOT_FINITE = re.compile(r"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
@@ -59,6 +60,11 @@ def rounded(word: str) -> float:
     if not _REAL.fullmatch(word):
         raise Damaged(f"{word[:40]!r} is not a number")
     return float(word)
+
+
+def unread(word: str) -> float:
+    """Return the number that a word is that nobody reads: any, or NaN or infinity by name."""
+    return float(word) if _NOT_FINITE.fullmatch(word) else rounded(word)
 
 
 def finite(value: float) -> float:

@@ -20,7 +20,8 @@ Table = list[tuple[float, ...]]
 def read_mat(data: bytes) -> Content:
     """Read v (n, 3) and f (m, 3), corners counted from 1, or the only two variables that fit."""
     # The text that opens level 5 has no zero in its first four bytes; a number of level 4 has.
-    found = dict(_level_4(data) if 0 in data[:4] else _level_5(data))
+    is_level_5 = 0 not in data[:4] or data[124:128] in (b"\0\1IM", b"\1\0MI")
+    found = dict(_level_5(data) if is_level_5 else _level_4(data))
     v, f = ("v", "f") if {"v", "f"} <= set(found) else _only_pair(found)
     points, polygons = [], []
     for row in found[v]:

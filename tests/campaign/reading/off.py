@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from tests.campaign.reading.content import Content, Damaged, integer, real
+from tests.campaign.reading.content import Content, Damaged, integer, real, unread
 
 _KEYWORD = re.compile(r"(ST)?C?N?OFF")
 
@@ -38,7 +38,9 @@ def read_off(data: bytes) -> Content:
     for words in lines[:vertices]:
         if len(words) < least:
             raise Damaged(f"a vertex with {len(words)} numbers")
-        points.append(tuple([real(word) for word in words][:3]))
+        points.append(tuple(real(word) for word in words[:3]))
+        for word in words[3:]:
+            unread(word)
     return Content(points, [_face(words) for words in lines[vertices:]]).checked()
 
 
@@ -47,5 +49,5 @@ def _face(words: list[str]) -> tuple[int, ...]:
     if corners < 0 or len(words) < 1 + corners:
         raise Damaged(f"a face of {corners} corners on a line of {len(words)} numbers")
     for word in words[1 + corners :]:
-        real(word)
+        unread(word)
     return tuple(integer(word) for word in words[1 : 1 + corners])
