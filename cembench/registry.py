@@ -848,13 +848,13 @@ def declared_by(plugin: str) -> list[_Registered]:
         raise RegistryError(f"plug-in {plugin!r} is neither a Python file (*.py) nor module:name.")
     # Only what the file itself declares, not what it imports.
     marks = [_mark_of(value) for value in specs]
-    found = [spec for spec in marks if spec and (name or spec.module == module.__name__)]
-    if not found:
+    declared = [spec for spec in marks if spec and (name or spec.module == module.__name__)]
+    if not declared:
         raise RegistryError(
             f"plug-in {plugin!r} declares nothing; decorate a function with @algorithm(...) or "
             "@surface_family(...) from cembench."
         )
-    return found
+    return declared
 
 
 def _import_file(path: Path) -> ModuleType:

@@ -79,9 +79,9 @@ def check(folder: Path, kind: Kind) -> Marker | None:
 
 def claim(folder: Path, kind: Kind) -> Marker:
     """Mark a folder as ours if :func:`check` allows it, and return the marker."""
-    found = check(folder, kind)
-    if found is not None:
-        return found
+    marker = check(folder, kind)
+    if marker is not None:
+        return marker
     now = datetime.now(UTC).isoformat(timespec="seconds")
     marker = Marker(kind=kind, made_at=now, token=uuid.uuid4().hex)
     _write(folder, marker)

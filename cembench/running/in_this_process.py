@@ -56,5 +56,5 @@ def _recorded(task: Task, check: Callable[..., tuple[Any, ...]]) -> tuple[Any, .
     for name in _CALLED:  # else the call would load them
         importlib.import_module(name)
     with threadpool_limits(limits=1):
-        outcome, *found = check(task.algorithm, task.mesh, task.cell)
-    return record_of(task, outcome, describe_environment()["id"], started), *found
+        outcome, *returned = check(task.algorithm, task.mesh, task.cell)
+    return record_of(task, outcome, describe_environment()["id"], started), *returned

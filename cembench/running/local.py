@@ -261,7 +261,7 @@ class _Run:
         scatter = Scatter.of(pairs)
         if asked == "auto":
             self.pairs = scatter.pairing_is_narrower
-        self.watcher.shows(scatter.words(prices, self._seconds_left(), pairs=self.pairs))
+        self.watcher.shows(scatter.forecast(prices, self._seconds_left(), pairs=self.pairs))
 
     def _time_group(self, cells: Sequence[CellState], number: int, kernel: float) -> None:
         """Time each cell in a process of its own, and after that all of them in one."""

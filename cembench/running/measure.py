@@ -189,20 +189,20 @@ def check_overlay(
 
     Its map is judged on the refined mesh. Without a map, the mesh is the given one.
     """
-    kept: list[Any] = []
+    refined: list[Any] = []
 
     def at_given_vertices(mesh: TriangleMesh, **parameters: Any) -> Parameterization:
-        kept.append(refinement_of(algorithm)(mesh, **parameters))
-        return Parameterization(kept[-1].uv[: mesh.n].copy(), extras=kept[-1].extras)
+        refined.append(refinement_of(algorithm)(mesh, **parameters))
+        return Parameterization(refined[-1].uv[: mesh.n].copy(), extras=refined[-1].extras)
 
     with _raised_by_signals() as raised:
-        here = replace(algorithm, function=at_given_vertices)
-        called, z = call_cell(here, mesh, cell, memory=False)
+        unrefined = replace(algorithm, function=at_given_vertices)
+        called, z = call_cell(unrefined, mesh, cell, memory=False)
     if raised:
         raise raised[0]
     if z is None:
         return called, mesh, None
-    fine, uv = kept[0].mesh, kept[0].uv
+    fine, uv = refined[0].mesh, refined[0].uv
     return judged_check(Promise.of(algorithm), fine, called, uv, figures=figures), fine, uv
 
 

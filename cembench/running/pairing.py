@@ -55,7 +55,7 @@ class Scatter:
         quantile = NormalDist().inv_cdf(1 - ERROR * share(rounds) / 2)
         return quantile * scatter / sqrt(_EFFICIENCY * rounds)
 
-    def words(self, prices: Sequence[float], seconds: float, *, pairs: bool) -> str:
+    def forecast(self, prices: Sequence[float], seconds: float, *, pairs: bool) -> str:
         """Return a sentence on what can be expected.
 
         `prices` are the seconds of a round of each cell, `seconds` those that the run has left.

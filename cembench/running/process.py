@@ -212,10 +212,10 @@ def _drain(log: Path, said: bytes) -> bytes:
     return said
 
 
-def end_of(file: IO[bytes], kept: int = KEPT_OUTPUT_BYTES) -> bytes:
-    """Return the last bytes of a file, at most so many."""
+def end_of(file: IO[bytes], length: int = KEPT_OUTPUT_BYTES) -> bytes:
+    """Return the last `length` bytes of a file, or all of a shorter one."""
     size = file.seek(0, os.SEEK_END)
-    file.seek(max(0, size - kept))
+    file.seek(max(0, size - length))
     return file.read()
 
 

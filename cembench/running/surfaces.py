@@ -224,8 +224,8 @@ def is_generated(surface: Any, registry: Registry) -> TypeGuard[str]:
 def generate_surface(registry: Registry, name: str, faces: int | None = None) -> TriangleMesh:
     """Generate a registered surface with about `faces` triangles, or at its own size."""
     family = registry.surface(name)
-    given = {} if faces is None else {"faces": faces}
-    mesh: TriangleMesh = family.function(**family.arguments(given))
+    sizes = {} if faces is None else {"faces": faces}
+    mesh: TriangleMesh = family.function(**family.arguments(sizes))
     return mesh
 
 

@@ -45,7 +45,7 @@ def test_the_scatter_between_processes_is_told_from_that_within_one():
     ],
 )
 def test_a_run_says_of_how_many_cells_there_will_be_intervals(seconds, said):
-    words = Scatter(0.08, 0.02).words([1.0, 10.0], seconds, pairs=True)
+    words = Scatter(0.08, 0.02).forecast([1.0, 10.0], seconds, pairs=True)
     assert "scatter by 8.0% between processes and by 2.0% within one" in words
     assert said in words
 
