@@ -45,7 +45,6 @@ OF_NO_COMMAND = ("-h", "--help", "--version")
 
 app = typer.Typer(
     cls=Verbs,
-    no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
