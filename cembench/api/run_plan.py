@@ -20,6 +20,7 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.estimate import Estimate, estimate, planned_seconds
+from cembench.running.external.installed import missing
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import (
@@ -74,11 +75,20 @@ class Plan:
         records = (r for r in self._records() if not self.options.measures_again(r))
         return {record.cell.key: record.outcome.status for record in records}
 
+    def lacking(self) -> dict[str, str]:
+        """Return what this machine lacks for algorithms of the plan, by name; none on a cluster."""
+        chosen = (
+            {} if self.cluster is not None else {t.algorithm.name: t.algorithm for t in self.tasks}
+        )
+        return {name: why for name, one in chosen.items() if (why := missing(one))}
+
     def costs(self) -> list[Estimate | None]:
-        """Return what each cell is expected to cost; None where it is recorded."""
-        records, held = self._records(), self.held()
+        """Return what each cell is expected to cost; None if it is recorded or cannot run."""
+        records, held, lacking = self._records(), self.held(), self.lacking()
         return [
-            None if t.cell.key in held else estimate(t.cell, t.facts.faces, records)
+            None
+            if t.cell.key in held or t.algorithm.name in lacking
+            else estimate(t.cell, t.facts.faces, records)
             for t in self.tasks
         ]
 
@@ -265,7 +275,7 @@ def plan_summary(plan: Plan) -> dict[str, Any]:
     """Return the cells of a plan with their estimates as plain data."""
     from dataclasses import asdict
 
-    held, costs = plan.held(), plan.costs()
+    held, lacking, costs = plan.held(), plan.lacking(), plan.costs()
     cells = [
         {
             "key": task.cell.key,
@@ -274,6 +284,7 @@ def plan_summary(plan: Plan) -> dict[str, Any]:
             "solves": task.cell.solves,
             "faces": task.facts.faces,
             "held": held.get(task.cell.key),
+            "lacks": lacking.get(task.algorithm.name),
             "estimate": None if cost is None else asdict(cost),
         }
         for task, cost in zip(plan.tasks, costs, strict=True)

@@ -5,7 +5,11 @@ A command loads its own module alone: all of them take a tenth of a second.
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -13,27 +17,34 @@ import typer
 from cembench.commands.console import out
 from cembench.commands.exit_codes import Verbs, ending
 
-#: The modules that add commands, and these, in the order of the help.
+#: The modules that add commands, these in the order of the help, and the function that describes
+#: each.
 MODULES = {
-    "catalogue": ("list", "doctor"),
-    "map": ("map",),
-    "benchmark": ("run",),
-    "report": ("report",),
-    "reproduce": ("reproduce",),
-    "run": ("status", "show", "compare", "merge", "export"),
-    "submit": ("submit", "submissions", "publish", "sign"),
-    "validate": ("validate",),
-    "peers": ("peers",),
-    "exhibits": (),  # those of papers
-    "morph": ("morph",),
-    "fetch": ("fetch",),
-    "repair": ("repair",),
-    "cut": ("cut",),
+    "catalogue": {"list": "api.catalogue:catalogue", "doctor": "commands.catalogue:doctor"},
+    "map": {"map": "api.map_files:map_files"},
+    "benchmark": {"run": "api.benchmark:benchmark"},
+    "report": {"report": "api.benchmark:report"},
+    "reproduce": {"reproduce": "api.reproduce:reproduce"},
+    "run": {
+        verb: f"commands.run:{verb}" for verb in ("status", "show", "compare", "merge", "export")
+    },
+    "submit": {
+        "submit": "api.submissions:submit",
+        **{verb: f"commands.submit:{verb}" for verb in ("submissions", "publish", "sign")},
+    },
+    "validate": {"validate": "api.validate:validate"},
+    "peers": {"peers": "commands.peers:peers"},
+    "exhibits": {},  # those of papers
+    "morph": {"morph": "api.morph_surfaces:morph"},
+    "fetch": {"fetch": "api.fetch:fetch"},
+    "repair": {"repair": "api.repair:repair"},
+    "cut": {"cut": "api.cut:cut"},
 }
+#: Options after which no command is called: their answer needs the first lines of the help alone.
+OF_NO_COMMAND = ("-h", "--help", "--version")
 
 app = typer.Typer(
     cls=Verbs,
-    no_args_is_help=True,
     add_completion=True,
     pretty_exceptions_enable=False,
     rich_markup_mode="rich",
@@ -65,9 +76,35 @@ def _global_options(
 
 def load(word: str = "") -> None:
     """Load the module of the command that a command line begins with; all if it is none."""
+    if word in OF_NO_COMMAND:
+        for verb, described in descriptions().items():
+            app.command(verb, help=described)(_global_options)
+        return
     chosen = [module for module, verbs in MODULES.items() if word in verbs]
     for module in chosen or MODULES:
         import_module(f"cembench.commands.{module}")
+
+
+def descriptions() -> dict[str, str]:
+    """Return the first sentence of each command's help, read without importing its module."""
+    found: dict[str, str] = {}
+    for module, verbs in MODULES.items():
+        of_papers = entry_points(group="cembench.verbs") if module == "exhibits" else ()
+        found |= {verb: _first_line(f"cembench.{where}") for verb, where in verbs.items()}
+        found |= {
+            entry.name: _first_line(f"{entry.value}:{entry.name}")
+            for entry in sorted(of_papers, key=lambda entry: entry.name)
+        }
+    return found
+
+
+def _first_line(function: str) -> str:
+    """Return the first paragraph of the docstring of ``module:name``."""
+    module, _, name = function.partition(":")
+    spec = find_spec(module)
+    source = "" if spec is None or spec.origin is None else Path(spec.origin).read_text("utf-8")
+    begin = re.search(rf'^ *def {name}\(.*?"""(.*?)(?:\n\n|""")', source, re.M | re.S)
+    return " ".join(begin[1].split()) if begin else ""
 
 
 def run() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -105,7 +106,7 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     from cembench.commands.progress import duration
     from cembench.report.run_tables import plan_table
 
-    costs, held, summary = plan.costs(), plan.held(), plan_summary(plan)
+    costs, summary = plan.costs(), plan_summary(plan)
     on_cluster = hours(plan.tasks, costs, plan.options.budget) if plan.cluster else None
     if as_json:
         print_json(summary | ({"cluster": on_cluster} if on_cluster else {}))
@@ -113,8 +114,8 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     out.print(
         plan_table(
             [
-                (t.cell, t.facts.faces, c.basis if c else f"recorded: {held[t.cell.key]}", c)
-                for t, c in zip(plan.tasks, costs, strict=True)
+                (t.cell, t.facts.faces, c.basis if c else _not_run(about), c)
+                for t, c, about in zip(plan.tasks, costs, summary["cells"], strict=True)
             ]
         )
     )
@@ -127,3 +128,8 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     )
     if on_cluster:
         show_hours(on_cluster)
+
+
+def _not_run(cell: Mapping[str, str | None]) -> str:
+    """Return why a cell of a plan has no cost."""
+    return f"recorded: {cell['held']}" if cell["held"] else "cannot run here"

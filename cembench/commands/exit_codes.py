@@ -58,6 +58,17 @@ def resumable() -> Iterator[None]:
 class Verbs(TyperGroup):
     """The commands; an OSError or EOFError in one is not treated as wrong usage or Ctrl-D."""
 
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the list of commands as plain text; loading what draws boxes doubles its time."""
+        self.rich_markup_mode = None
+        for command in self.commands.values():
+            command.short_help = (command.help or "").split("\n\n")[0]
+        super().format_help(ctx, formatter)
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Read a command line; without a word it asks for help."""
+        return super().parse_args(ctx, args or ([] if ctx.resilient_parsing else ["--help"]))
+
     def invoke(self, ctx: Any) -> Any:
         """Call the command."""
         try:

@@ -231,9 +231,15 @@ def test_one_bad_file_of_a_folder_is_left_out_with_a_note(cli, cap):
 
 def test_a_program_that_is_not_there_is_told_before_anything_is_measured(cli, cap):
     words = ("run", "--mesh", cap, "--command", "no-such-program {input} {output}", "--dry-run")
-    code, _, err = cli(*words)
+    code, out, err = cli(*words, "-a", "lscm")
     assert code == 0
     assert "there is no program 'no-such-program'" in " ".join(err.split())
+    assert "cannot run here" in out
+    assert "1 of 2 cells to measure" in out
+    cells = json.loads(cli(*words, "--json")[1])["cells"]
+    lacking = [one for one in cells if one["lacks"]]
+    assert [one["estimate"] for one in lacking] == [None]
+    assert "no-such-program" in lacking[0]["lacks"]
 
 
 def test_vertices_and_faces_may_be_two_arguments():

@@ -1,14 +1,16 @@
 """The command line and the package start quickly: each loads only what it needs."""
 
+import inspect
 import subprocess
 import sys
 from importlib.metadata import entry_points
+from itertools import chain
 
 import pytest
 
 import cembench
 from cembench.commands import cli
-from cembench.commands.app import MODULES
+from cembench.commands.app import MODULES, descriptions
 
 #: Each takes a tenth of a second to load, or more.
 SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
@@ -54,7 +56,29 @@ def test_a_command_line_loads_the_module_of_its_command():
 def test_the_modules_name_all_commands():
     known = [one.name or one.callback.__name__ for one in cli.app.registered_commands]
     of_papers = [entry.name for entry in entry_points(group="cembench.verbs")]
-    assert sorted(known) == sorted([*sum(MODULES.values(), ()), *of_papers])
+    assert sorted(known) == sorted([*chain.from_iterable(MODULES.values()), *of_papers])
+
+
+def test_the_help_describes_the_commands_in_their_own_words():
+    texts = {
+        one.name or one.callback.__name__: inspect.getdoc(one.callback).split("\n\n")[0]
+        for one in cli.app.registered_commands
+    }
+    assert [*descriptions().items()] == [(k, " ".join(v.split())) for k, v in texts.items()]
+
+
+def test_the_help_of_all_commands_loads_no_command():
+    code = """if True:
+        import sys
+        sys.argv = ["cembench", "--help"]
+        from cembench.__main__ import main
+        try: main()
+        except SystemExit: print(*sys.modules, file=sys.stderr)
+    """
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "Cut a surface open along short curves" in done.stdout
+    assert "cembench.commands.app" in done.stderr.split()
+    assert not {f"cembench.commands.{name}" for name in MODULES} & {*done.stderr.split()}
 
 
 def test_a_list_needs_no_scipy_and_no_records():
