@@ -27,8 +27,9 @@ lint: $(READY)
 types: $(READY)
 	$(BIN)/mypy
 
+# Bytecode is kept even where the system's default is not to: every interpreter that a test starts compiles everything otherwise.
 tests: $(READY)
-	$(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --no-loadscope-reorder --durations=25
+	PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -m "not slow" -n auto --dist loadfile --no-loadscope-reorder --durations=25
 
 docs: $(READY)
 	$(BIN)/python -m sphinx -b html -W --keep-going docs docs/_build/html
