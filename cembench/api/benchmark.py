@@ -116,13 +116,7 @@ class Run:
         pandas.DataFrame
             Figures, seconds with a 95 % interval, and status of each cell.
 
-        Raises
-        ------
-        MissingExtra
-            pandas is not installed; :meth:`rows` works without it.
-
         """
-        require(Extra.TABLES, "a DataFrame")
         import pandas as pd
 
         table = pd.DataFrame(self.rows(reference))

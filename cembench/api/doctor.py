@@ -23,6 +23,7 @@ _REQUIRED = {
     "scipy": "scipy",
     "libigl": "igl",
     "matplotlib": "matplotlib",
+    "pandas": "pandas",
 }
 #: Purpose of each extra.
 _FOR = {
@@ -34,7 +35,6 @@ _FOR = {
     Extra.PARQUET: "exports runs as Parquet",
     Extra.REPORT: "writes reports",
     Extra.STANDINS: "makes stand-ins for the paper's models",
-    Extra.TABLES: "gives a run's figures as pandas DataFrames",
     Extra.VIDEO: "writes films as MP4",
     Extra.VTP: "reads VTP files",
     Extra.XATLAS: "unwraps surfaces into islands",

@@ -25,7 +25,6 @@ class Extra(StrEnum):
     PARQUET = "parquet"
     REPORT = "report"
     STANDINS = "standins"
-    TABLES = "tables"
     VIDEO = "video"
     VTP = "vtp"
     XATLAS = "xatlas"
@@ -39,9 +38,8 @@ MODULES: Mapping[Extra, tuple[str, ...]] = {
     Extra.METIS: ("pymetis",),
     Extra.PARDISO: ("pypardiso",),
     Extra.PARQUET: ("pyarrow",),
-    Extra.REPORT: ("pandas", "plotly"),
+    Extra.REPORT: ("plotly",),
     Extra.STANDINS: ("skimage", "pymeshlab"),
-    Extra.TABLES: ("pandas",),
     Extra.VIDEO: ("imageio_ffmpeg",),
     Extra.VTP: ("vtk",),
     Extra.XATLAS: ("xatlas",),
@@ -63,9 +61,9 @@ class MissingExtra(CembenchError):  # noqa: N818 - what is not there, as the mes
     Examples
     --------
     >>> from cembench import MissingExtra
-    >>> error = MissingExtra(Extra.TABLES, "a table", ["pandas"])
+    >>> error = MissingExtra(Extra.VIDEO, "a film", ["imageio_ffmpeg"])
     >>> error.extra
-    <Extra.TABLES: 'tables'>
+    <Extra.VIDEO: 'video'>
 
     """
 
@@ -110,7 +108,7 @@ def require(extra: Extra, purpose: str, *modules: str) -> None:
 
     Examples
     --------
-    >>> require(Extra.TABLES, "a table", "numpy")
+    >>> require(Extra.VIDEO, "a film", "numpy")
 
     """
     absent = missing(extra, *modules)

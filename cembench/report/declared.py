@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from pydantic import Field, model_validator
 
@@ -61,8 +61,6 @@ from cembench.results.records import Record
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Rows: TypeAlias = "list[dict[str, Any]]"
 
 
 def _with_mark(name: str, record: Record) -> str:
@@ -231,23 +229,25 @@ def declared_table(
     spec = declared or own_tables()[name]
     held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]
     policy = policy or evidence.policies[0]
-    chosen = [row for row in evidence.frame_rows if row["solves"] in held]
+    chosen = evidence.frame["solves"].isin(held)
     if keys is not None:
-        wanted = set(keys)
-        chosen = [row for row in chosen if row["key"] in wanted]
-    if chosen and (spec.where or spec.sort):
-        chosen = _selected(evidence, spec, chosen)
-    if not chosen:
+        chosen &= evidence.frame["key"].isin(list(keys))
+    frame = evidence.frame[chosen]
+    if spec.where and len(frame):
+        frame = frame[evaluate(spec.where, frame).astype(bool)]
+    if frame.empty:
         return None
+    if spec.sort:
+        frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
     once = " Each model counts once, and is preferred over its stand-in."
-    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(chosen))}
-    told |= {"surfaces": str(len({row["place"] for row in chosen}))}
+    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(frame))}
+    told |= {"surfaces": str(frame["place"].nunique())}
     told |= {"once": once if evidence.stand_ins_left_out else ""}
     told |= {"reference": evidence.reference_label, **texts}
-    below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, chosen))))
+    below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
-        return _of_surfaces(evidence, spec, chosen, surfaces, called or name, told, below)
-    columns, entries = zip(*_columns(evidence, spec, chosen, told), strict=True)
+        return _of_surfaces(evidence, spec, frame, surfaces, called or name, told, below)
+    columns, entries = zip(*_columns(evidence, spec, frame, told), strict=True)
     title, caption = filled(spec.title, told), filled(spec.caption, told)
     return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
@@ -255,18 +255,17 @@ def declared_table(
 def _of_surfaces(
     evidence: Evidence,
     spec: DeclaredTable,
-    chosen: Rows,
+    frame: pd.DataFrame,
     surfaces: Sequence[MeasuredSurface],
     name: str,
     told: Mapping[str, str],
     notes: Sequence[str],
 ) -> Table:
     """Return a table of surfaces: columns by algorithm if each names it in its group."""
-    places = dict.fromkeys(row["place"] for row in chosen)
-    surfaces = surfaces or [evidence.surfaces[place] for place in places]
-    series = [evidence.series[k] for k in sorted({row["series"] for row in chosen})]
-    policies = {row["solves"] for row in chosen}
-    policy = policies.pop() if len(policies) == 1 else None
+    surfaces = surfaces or [evidence.surfaces[place] for place in frame["place"].unique()]
+    series = [evidence.series[k] for k in sorted(frame["series"].unique())]
+    policy, *several = frame["solves"].unique()
+    policy = None if several else policy
     known = {**told, "surfaces": len(surfaces), "here": POLICIES.get(policy or "", str(policy))}
     quantities = []
     for one in spec.columns:
@@ -302,29 +301,15 @@ def _computed(evidence: Evidence, one: DeclaredColumn) -> FrameColumn:
     return FrameColumn(one.value, of, form=one.form, lacking=one.lacking)
 
 
-def _frame_of(evidence: Evidence, rows: Rows) -> pd.DataFrame:
-    return evidence.frame[evidence.frame["key"].isin([row["key"] for row in rows])]
-
-
-def _selected(evidence: Evidence, spec: DeclaredTable, rows: Rows) -> Rows:
-    frame = _frame_of(evidence, rows)
-    if spec.where:
-        frame = frame[evaluate(spec.where, frame).astype(bool)]
-    if spec.sort:
-        frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
-    by_key = {row["key"]: row for row in rows}
-    return [by_key[key] for key in frame["key"]]
-
-
 def _columns(
-    evidence: Evidence, spec: DeclaredTable, chosen: Rows, known: Mapping[str, str]
+    evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame, known: Mapping[str, str]
 ) -> list[tuple[Column, list[Value]]]:
     """Return the columns with their entries, those that are optional only if they hold some."""
     first: list[tuple[Column, list[Value]]] = []
     if spec.rows == "record":
-        made = [[_entry(evidence, row, one) for row in chosen] for one in spec.columns]
+        rows = _named_rows(frame)
+        made = [[_entry(evidence, row, one) for row in rows] for one in spec.columns]
     else:
-        frame = _frame_of(evidence, chosen)
         frame = frame.assign(**{name: evaluate(of, frame) for name, of in spec.given.items()})
         frame = frame.sort_values("series", kind="stable")
         groups = (
@@ -366,12 +351,17 @@ def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     return entry(found, form, one.lacking, record=key)
 
 
-def _notes(evidence: Evidence, spec: DeclaredTable, chosen: Rows) -> Iterable[str]:
-    records = [evidence.by_key[row["key"]] for row in chosen]
+def _named_rows(frame: pd.DataFrame) -> list[dict[str, Any]]:
+    """Return what the rows are called, and their keys."""
+    return cast("list[dict[str, Any]]", frame[["key", "surface", "label"]].to_dict("records"))
+
+
+def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iterable[str]:
+    records = [evidence.by_key[key] for key in frame["key"]]
     if "marks" in spec.notes:
         yield from marks_explained(records)
-    several = len({row["place"] for row in chosen}) > 1
-    for row, record in zip(chosen, records, strict=True):
+    several = frame["place"].nunique() > 1
+    for row, record in zip(_named_rows(frame), records, strict=True):
         surface = f"{row['surface']}, " if several else ""
         where = f"{surface}{row['label']} ({record.cell.solves})"
         if "causes" in spec.notes and record.outcome.status != "ok":

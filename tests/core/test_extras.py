@@ -41,7 +41,8 @@ def test_the_extras_are_those_of_the_package():
         Extra.VTP,
         Extra.XATLAS,
     }
-    assert set(declared) == {*Extra, "all", "docs", "test"}
+    assert set(declared) == {*Extra, "all", "docs", "tables", "test"}
+    assert declared["tables"] == []  # the name installs, and brings nothing more
 
 
 def test_no_extra_is_in_the_default_installation():
@@ -57,7 +58,7 @@ def block(monkeypatch, *modules):
 def test_a_missing_module_is_named_with_its_extra(monkeypatch):
     block(monkeypatch, "plotly")
     assert missing(Extra.REPORT) == ["plotly"]
-    require(Extra.REPORT, "a table", "pandas")
+    require(Extra.REPORT, "a table", "numpy")
     with pytest.raises(MissingExtra) as found:
         require(Extra.REPORT, "a report")
     assert found.value.extra is Extra.REPORT
@@ -83,10 +84,6 @@ def parquet(folder):
     export_rows([{"a": 1}], folder / "a.parquet", Format.parquet)
 
 
-def a_table(folder):
-    Run(folder).table()
-
-
 def a_stand_in(folder):
     cembench.surface("cowboy-hat-stand-in", 1000)
 
@@ -104,7 +101,6 @@ def a_film(folder):
         (a_report, "plotly", Extra.REPORT),
         (a_validation, "plotly", Extra.REPORT),
         (parquet, "pyarrow", Extra.PARQUET),
-        (a_table, "pandas", Extra.TABLES),
         (a_stand_in, "skimage", Extra.STANDINS),
         (a_film, "imageio_ffmpeg", Extra.VIDEO),
     ],

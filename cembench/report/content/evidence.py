@@ -161,33 +161,19 @@ class Evidence:
     def frame(self) -> pd.DataFrame:
         """The records as a frame, a row each, by surface, series and policy.
 
-        Besides the columns of :attr:`frame_rows` it has `as_good`: about as good as the best map to
-        the disk there; and of the comparison with the reference's main parameters `comparison`,
-        `speedup` with its interval, `verdict`, `ratio`, and `paired`, the rounds with both.
-        """
-        import pandas as pd
-
-        frame = pd.DataFrame([row | self._compared(row["key"]) for row in self.frame_rows])
-        frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
-        disks = frame[frame["ok"] & (frame["target"] == DISK)]
-        best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
-        good = (disks[ANGLE] <= AS_GOOD * best) | (disks[ANGLE] <= best + DEGREES)
-        # The copy holds columns of a type together: rows are taken in half the time.
-        return frame.copy().assign(as_good=good.reindex(frame.index, fill_value=False))
-
-    @cached_property
-    def frame_rows(self) -> list[dict[str, Any]]:
-        """The rows of :attr:`frame`, for what needs no pandas.
-
         Its columns are those of :attr:`rows`, the derived ones of :mod:`cembench.results.columns`,
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
         number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
         model), `once` (the same, or of no model), `printed` (an algorithm of the paper), and
-        `reference`.
+        `reference`; `as_good`: about as good as the best map to the disk there; and of the
+        comparison with the reference's main parameters `comparison`, `speedup` with its interval,
+        `verdict`, `ratio`, and `paired`, the rounds with both.
         """
+        import pandas as pd
+
         series = {(s.algorithm, s.variant): (k, s) for k, s in enumerate(self.series)}
         surfaces = {s.mesh_hash: (k, s) for k, s in enumerate(self.surfaces)}
-        found = []
+        rows = []
         for record in self.records:
             k, own = series[record.cell.algorithm, self._variants[record.cell.key]]
             place, surface = surfaces[record.cell.mesh_hash]
@@ -200,9 +186,16 @@ class Evidence:
             more["once"] = surface not in self.stand_ins_left_out
             more["printed"] = own.algorithm in self.paper.algorithms
             more["reference"] = own.algorithm == self.reference
-            order = (place, k, self.policies.index(record.cell.solves))
-            found.append((order, figures | about | more))
-        return [row for _, row in sorted(found, key=lambda pair: pair[0])]
+            rows.append(figures | about | more | self._compared(record.cell.key))
+        order = {policy: k for k, policy in enumerate(self.policies)}
+        rows.sort(key=lambda row: (row["place"], row["series"], order[str(row["solves"])]))
+        frame = pd.DataFrame(rows)
+        frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
+        disks = frame[frame["ok"] & (frame["target"] == DISK)]
+        best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
+        good = (disks[ANGLE] <= AS_GOOD * best) | (disks[ANGLE] <= best + DEGREES)
+        # The copy holds columns of a type together: rows are taken in half the time.
+        return frame.copy().assign(as_good=good.reindex(frame.index, fill_value=False))
 
     @cached_property
     def best_maps(self) -> pd.DataFrame:
