@@ -84,10 +84,6 @@ def parquet(folder):
     export_rows([{"a": 1}], folder / "a.parquet", Format.parquet)
 
 
-def a_table(folder):
-    Run(folder).table()
-
-
 def a_stand_in(folder):
     cembench.surface("cowboy-hat-stand-in", 1000)
 
