@@ -78,8 +78,8 @@ BUDGETS = {
     "report": 7_500,
     "validation": 2_350,
     "morphing": 1_350,
-    "api": 5_000,
-    "commands": 2_800,
+    "api": 5_050,
+    "commands": 2_850,
 }
 
 
