@@ -236,7 +236,7 @@ def _folded_by_rounding(output: Path, z: Complex, soup: Soup) -> tuple[Notice, .
     if not count:
         return ()
     precision = "single precision" if single else "the unit square"
-    remedy = "write OBJ, VTP or NPZ" if single else "uv='disk' (--uv disk) keeps the map as it is"
+    remedy = "write OBJ, VTP or NPZ" if single else "UVs in the disk (uv: disk) stay as they are"
     told = (
         f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
         f"or flattens them; {remedy}"

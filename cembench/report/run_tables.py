@@ -54,7 +54,7 @@ def results_table(evidence: Evidence) -> Section:
     busy = sum(neighbours.busy for neighbours in noted)
     if busy:
         message = f"The machine was busy during {busy} of {len(noted)} processes; close other"
-        items.append(Text(f"{message} programs, or add --repeat-busy."))
+        items.append(Text(f"{message} programs, or add --repeat-busy 2 to `cembench run`."))
     return Section("results", "", tuple(items))
 
 

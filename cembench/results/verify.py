@@ -23,6 +23,7 @@ from cembench.conformal.atlas import atlas_metrics
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import RecordError
 from cembench.core.loading import read_bytes
+from cembench.core.wording import Advice
 from cembench.results.records import Record, is_as_written
 from cembench.results.store import Store, read_record
 
@@ -114,17 +115,23 @@ def sound_records(store: Store, depth: Depth) -> list[Record]:
     store.check_is_run()
     verified = verify(store, depth)
     if verified.disagreements:
-        raise RecordError(_refusal(store, verified.disagreements))
+        raise _refusal(store, verified.disagreements)
     return list(verified.records)
 
 
-def _refusal(store: Store, found: Sequence[Finding]) -> str:
+def _refusal(store: Store, found: Sequence[Finding]) -> RecordError:
     named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
     more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-    return (
-        f"{store.folder} cannot be used: its records or maps were changed after measuring.\n"
-        f"{named}{more}\nDelete these files and run again, or restore them. "
-        f"`cembench status {store.folder} --verify` compares everything."
+    return RecordError.about(
+        "{folder} cannot be used: its records or maps were changed after measuring.\n"
+        "{named}{more}\nDelete these files and run again, or restore them. {everything} compares "
+        "everything.",
+        folder=store.folder,
+        named=named,
+        more=more,
+        everything=Advice(
+            "`report(verify=True)` of the run", f"`cembench status {store.folder} --verify`"
+        ),
     )
 
 

@@ -81,6 +81,16 @@ def test_the_help_of_all_commands_loads_no_command():
     assert not {f"cembench.commands.{name}" for name in MODULES} & {*done.stderr.split()}
 
 
+def test_a_command_line_without_a_word_prints_the_help():
+    start = [sys.executable, "-m", "cembench"]
+    bare, asked = (
+        subprocess.run([*start, *more], capture_output=True, text=True, check=True).stdout
+        for more in ([], ["--help"])
+    )
+    assert bare == asked
+    assert "Commands:" in asked
+
+
 def test_a_list_needs_no_scipy_and_no_records():
     # The command line library itself loads pydantic, where a command has options.
     assert loaded(command("list")) == {"numpy", "scipy", "pydantic"}
