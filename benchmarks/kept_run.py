@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 from collections.abc import Sequence
 from pathlib import Path
@@ -11,6 +12,7 @@ from benchmarks.pages import ROOT, Section
 from cembench.core.atomic import write_text
 from cembench.core.errors import RecordError
 from cembench.results import run_folder
+from cembench.results.records import digest
 
 #: What a kept run lacks: maps and surfaces, which a report draws, and what a run alone needs.
 LEFT_OUT = ("maps", "meshes", "samples", "lock")
@@ -23,8 +25,9 @@ def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str
         python -m benchmarks kept-run results/ldm reports/papers/ldm2018 --hide ~/ldm
         cembench report reports/papers/ldm2018 --paper ldm2018
 
-    A folder of `hide`, one that others do not have, is named by its last part. The folder is
-    replaced if it holds a run. `command` is the one that measured it, for `make refresh`.
+    A folder of `hide`, one that others do not have, is named by its last part, and the record that
+    named it gets its digest anew. The folder is replaced if it holds a run. `command` is the one
+    that measured it, for `make refresh`.
     """
     run_folder.check(run)
     folder = folder.absolute()
@@ -41,7 +44,10 @@ def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str
         for path in hide:
             shown = shown.replace(str(path), path.name)
         if shown != text:
-            write_text(file, shown)
+            content = json.loads(shown)
+            if "digest" in content:
+                content["digest"] = digest(content)
+            write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     if folder.is_relative_to(ROOT):
         record(folder.relative_to(ROOT).as_posix(), MEASURING, command, None)
     size = sum(file.stat().st_size for file in files)
