@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -38,31 +39,36 @@ def energy(mesh: DiskMesh, uv: Any) -> float:
     return float(metrics["conformal_energy"] / metrics["image_area"])
 
 
-def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict[float, int]]:
-    """Return E_C of the map after every factorisation, and how many each tolerance takes."""
-    L, tried = laplacian(mesh), []
+@contextmanager
+def remembering() -> Iterator[list[Any]]:
+    """Yield a list that gets every trial of the flow, None for one that failed."""
+    centred, tried = rules._centred, list[Any]()
 
     def remembered(S: Any, mass: Any) -> Any:
         tried.append(centred(S, mass))
         return tried[-1]
 
-    centred, ends = rules._centred, {}
     vars(rules)["_centred"] = remembered
     try:
-        for tolerance in sorted(TOLERANCES):  # the longest flow is remembered last
+        yield tried
+    finally:
+        vars(rules)["_centred"] = centred
+
+
+def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict[float, int]]:
+    """Return E_C of the map after every factorisation, and how many each tolerance takes."""
+    L, ends = laplacian(mesh), {}
+    with remembering() as tried:
+        for tolerance in sorted(TOLERANCES, reverse=True):  # the longest flow is remembered last
             tried.clear()
             with ruled(FIRST=first, GROWTH=growth):
                 rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MOST_STEPS)
-            ends[tolerance] = len(tried) - 1  # the first trial is the start
-            if tolerance == min(TOLERANCES):
-                trials = list(tried)
-    finally:
-        vars(rules)["_centred"] = centred
+            ends[tolerance] = len(tried) - 1
     L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
-    return list(_finished(mesh, L, _accepted(L_double, trials))), ends
+    return list(_finished(mesh, L, accepted(L_double, tried))), ends
 
 
-def _accepted(L_double: Any, tried: list[Any]) -> Iterator[Any]:
+def accepted(L_double: Any, tried: list[Any]) -> Iterator[Any]:
     """Yield each trial that lowered the sphere's energy, None for the others."""
     least = math.inf
     for S in tried:

@@ -10,6 +10,7 @@ from typing import Any
 
 from benchmarks.origins import changed, origins, working_tree
 from benchmarks.pages import ROOT, Section, Table
+from cembench.results.store import Store
 
 PAGE = "reports/README.md"
 LAYOUT = """
@@ -32,8 +33,9 @@ def made_tables() -> list[str]:
 
 
 def kept_reports() -> list[str]:
-    """Return the folders of kept reports."""
-    return [f"reports/{path.parent.name}" for path in sorted(ROOT.glob("reports/*/report.md"))]
+    """Return the folders of kept reports and kept runs."""
+    files = (*ROOT.glob("reports/*/report.md"), *ROOT.glob("reports/papers/*/cembench.json"))
+    return sorted(path.parent.relative_to(ROOT).as_posix() for path in files)
 
 
 def took(seconds: float | None) -> str:
@@ -52,6 +54,9 @@ def took(seconds: float | None) -> str:
 
 def measured_seconds(report: str) -> float:
     """Return the seconds of one call in each round of a kept report: what a run takes at least."""
+    if (ROOT / report / "records").is_dir():  # a kept run
+        outcomes = [one.outcome for one in Store(ROOT / report).records()]
+        return sum(sum(each.calls) for one in outcomes for each in one.rounds)
     with (ROOT / report / "records.csv").open(newline="", encoding="utf-8") as lines:
         rounds = [json.loads(row["seconds_raw"] or "[]") for row in csv.DictReader(lines)]
     return sum(map(sum, rounds))

@@ -51,7 +51,7 @@ def matlab_program(name: str, function: str, where: str, **about: Any) -> Callab
         if declared["version"]:
             path = f"max_recursion_depth({DEPTH}); addpath({matlab_string(SHIMS)}); {path}"
         declared["command"] = shlex.join([*words[:-1], path + words[-1]])
-    return external_program(name, remedy=remedy, **about, **declared)
+    return external_program(name, **about, **declared | {"remedy": remedy})
 
 
 @matlab_program(

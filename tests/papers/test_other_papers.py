@@ -5,11 +5,16 @@ from math import floor, sqrt
 
 import numpy as np
 import pytest
+from cembench.algorithms.peers import choi_lui
+from cembench.papers.ceps2021.overlay import cetm_flips_overlay
 from cembench.papers.openabf.surfaces import sphere, wavy
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.holed_disk import holed_disk
 
+from cembench.conformal.metrics import flipped_triangles
+from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.registry import load_registry
 from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Table, items_of, sections_of
@@ -160,6 +165,49 @@ def test_flips_are_compared_with_cetm_where_that_fails(disks):
         "not tested here",
         "CETM has 2 of 2 surfaces, cetm-flips 2; 0 of the 0 that CETM lacks",
     )
+
+
+def test_the_overlay_is_judged_on_the_refinement():
+    mesh = hemi_ellipsoid(600)
+    found = cetm_flips_overlay(mesh)
+    told = found.extras
+    assert (told["overlay_valid"], flipped_triangles(mesh, found.uv)) == (1.0, 0)
+    assert told["overlay_triangles"] > mesh.m
+    assert told["flips"] > 0
+    assert told["curvature"] < 1e-9
+    own = load_registry().algorithm("cetm-flips").function(mesh)
+    assert told["curvature"] == own.extras["curvature"]
+    assert np.allclose(found.uv, own.uv, atol=1e-12)
+
+
+def test_the_table_of_success_counts_maps_folds_and_angle_sums(disks, tmp_path, quick_drawing):
+    tables = find_paper("ceps2021").folder / "success.toml"
+    report = write_report(disks, tmp_path, "c", paper=find_paper("ceps2021"), tables=[tables])
+    found = {table.name: table for table in items_of(report, Table)}["declared-1-success-of-disks"]
+    rows = {row[0].text: [value.text for value in row] for row in found.rows}
+    headings = [f"{c.group} {c.title}".strip() for c in found.columns]
+    flips = dict(zip(headings, rows["CETM, flips"], strict=True))
+    assert (flips["disks"], flips["valid"], flips["share"]) == ("2", "2", "100.0")
+    assert float(flips["error of angle sums largest"]) < 1e-8
+    assert flips["seconds median"] == "8"
+    assert flips["on the refinement valid"] == "-"
+
+
+@pytest.mark.parametrize("name", ["fdm-program", "ldm-program", "poly-annulus-program"])
+def test_a_program_that_its_variable_names_is_declared_with_its_own_remedy(
+    name, tmp_path, monkeypatch
+):
+    file = tmp_path / "its_map.m"
+    file.write_text("function uv = its_map(v, f)\nuv = v(:, 1:2);\n")
+    monkeypatch.setenv(f"CEMBENCH_{name.upper().replace('-', '_')}", str(file))
+
+    @choi_lui.matlab_program(name, "f", "https://example.org", title=name, target="disk")
+    def declared(mesh: DiskMesh) -> None:
+        """Map a disk."""
+
+    program = vars(declared)["__cembench__"].program
+    assert any("its_map(double(mesh.v)" in word for word in program.command)
+    assert program.remedy.startswith("Get it from https://example.org")
 
 
 def of_models(name, models):

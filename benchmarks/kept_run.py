@@ -1,0 +1,54 @@
+"""The records of a run, which the repository keeps so that its report can be made again."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from benchmarks.origins import MEASURING, record
+from benchmarks.pages import ROOT, Section
+from cembench.core.atomic import write_text
+from cembench.core.errors import RecordError
+from cembench.results import run_folder
+from cembench.results.records import digest
+
+#: What a kept run lacks: maps and surfaces, which a report draws, and what a run alone needs.
+LEFT_OUT = ("maps", "meshes", "samples", "lock")
+
+
+def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str = "") -> Section:
+    """Keep a run's records, without maps and surfaces: `cembench report` makes its page again.
+
+        cembench run ... -o results/ldm
+        python -m benchmarks kept-run results/ldm reports/papers/ldm2018 --hide ~/ldm
+        cembench report reports/papers/ldm2018 --paper ldm2018
+
+    A folder of `hide`, one that others do not have, is named by its last part, and the record that
+    named it gets its digest anew. The folder is replaced if it holds a run. `command` is the one
+    that measured it, for `make refresh`.
+    """
+    run_folder.check(run)
+    folder = folder.absolute()
+    if folder.exists():
+        try:
+            run_folder.check(folder)
+        except RecordError as error:
+            raise SystemExit(f"{folder} is there, but holds no run to replace.") from error
+        shutil.rmtree(folder)
+    shutil.copytree(run, folder, ignore=shutil.ignore_patterns(*LEFT_OUT))
+    files = sorted(folder.rglob("*.json"))
+    for file in files:
+        text = shown = file.read_text(encoding="utf-8")
+        for path in hide:
+            shown = shown.replace(str(path), path.name)
+        if shown != text:
+            content = json.loads(shown)
+            if "digest" in content:
+                content["digest"] = digest(content)
+            write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+    if folder.is_relative_to(ROOT):
+        record(folder.relative_to(ROOT).as_posix(), MEASURING, command, None)
+    size = sum(file.stat().st_size for file in files)
+    return Section([f"{folder.name}: {len(files)} files, {size:,} bytes"])
