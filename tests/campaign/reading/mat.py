@@ -99,14 +99,17 @@ def _matrix(data: bytes, order: str) -> tuple[str, Table] | None:
     (flags,) = struct.unpack_from(order + "I", parts[0][1])
     name = parts[2][1].decode("latin-1")
     dimensions = struct.unpack(f"{order}{len(parts[1][1]) // 4}i", parts[1][1])
-    if flags & 0xFF not in _NUMERIC or flags & 0x0800 or len(dimensions) != 2:
-        if name not in ("v", "f"):
-            return None
-        raise Damaged(f"{name} is not a matrix of real numbers")
-    kind, body = parts[3]
-    if kind not in _TYPES:
-        raise Damaged(f"{name} is of an unknown type")
-    return name, _table(_TYPES[kind], body, order, *dimensions, name=name)
+    try:
+        if flags & 0xFF not in _NUMERIC or flags & 0x0800 or len(dimensions) != 2:
+            raise Damaged(f"{name} is not a matrix of real numbers")
+        kind, body = parts[3]
+        if kind not in _TYPES:
+            raise Damaged(f"{name} is of an unknown type")
+        return name, _table(_TYPES[kind], body, order, *dimensions, name=name)
+    except Damaged:
+        if name in ("v", "f"):
+            raise
+        return None  # nobody reads it
 
 
 def _table(form: str, body: bytes, order: str, rows: int, columns: int, *, name: str) -> Table:
