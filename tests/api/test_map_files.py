@@ -80,7 +80,8 @@ def test_triangles_that_rounding_folds_are_counted(tmp_path):
     assert "single precision" in str(notice)
     z[inner] *= 1e-6
     (notice,) = save_map(tmp_path / "a.npz", mesh, z)
-    assert "(--uv disk) keeps the map" in str(notice)
+    assert "(uv: disk) stay as they are" in str(notice)
+    assert "--" not in str(notice)
 
 
 def test_map_bakes_a_texture_for_the_new_coordinates(cli, given):
