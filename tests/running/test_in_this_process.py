@@ -79,7 +79,6 @@ def test_a_signal_is_no_fault_of_the_algorithm(call, number, handler, raised, mo
 
     task = task_of(spec)
     task = replace(task, algorithm=replace(spec, function=slow))
-    monkeypatch.setattr("cembench.api.parameterize.plan_cells", lambda *_: [task])
     monkeypatch.setattr("cembench.registry.Registry.algorithm", lambda *_: task.algorithm)
     before = signal.signal(number, handler)
     try:
