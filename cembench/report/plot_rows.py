@@ -96,7 +96,8 @@ def _difficulty(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> p
 def printed(evidence: Evidence, *_: Any) -> pd.DataFrame:
     """Return what the paper printed, a row for each model and algorithm, as columns of the frame.
 
-    `measured` says whether the run has a surface for the model. `seconds_table` is the number of
+    `measured` says whether the run has a surface for the model; figures that the paper does not
+    print are missing. `seconds_table` is the number of
     the table that the seconds are in, and so on.
     """
     import pandas as pd
@@ -118,7 +119,9 @@ def printed(evidence: Evidence, *_: Any) -> pd.DataFrame:
                     row |= {one.column: value if one.only in ("", algorithm) else None}
                     row |= {f"{one.column}_table": table}
             rows.append(row)
-    return pd.DataFrame(rows).astype(dict.fromkeys(_figures(paper), float))
+    found = pd.DataFrame(rows).astype(dict.fromkeys(_figures(paper), float))
+    figures = evidence.frame.select_dtypes("number").columns
+    return found.reindex(columns=found.columns.union(figures, sort=False))
 
 
 def _figures(paper: Paper) -> set[str]:

@@ -2,6 +2,8 @@
 
 import re
 from math import floor, sqrt
+from pathlib import Path
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -19,7 +21,7 @@ from cembench.report.content.claims import claims
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Table, items_of, sections_of
 from cembench.report.write_report import write_report
-from cembench.results.papers import NO_PAPER, find_paper, papers, usual_paper
+from cembench.results.papers import NO_PAPER, find_paper, papers, read_paper, usual_paper
 from tests.papers.invented_run import write
 
 OTHERS = sorted(papers().keys() - {"cem"})
@@ -43,6 +45,26 @@ def test_the_usual_paper_is_that_of_the_profiles():
 def verdicts(run, name, paper=None):
     evidence = Evidence.of(run, paper or find_paper(name))
     return {claim.name: (claim.verdict, claim.figures) for claim in claims(evidence, {})}
+
+
+def test_the_guide_s_paper_has_a_report(disks, tmp_path, quick_drawing):
+    """Its tables print no seconds, and its model is one of the run's here."""
+    page = (Path(__file__).parents[2] / "docs/papers.md").read_text()
+    about, tables, stated = map(dedent, re.findall(r"```toml\n(.*?)```", page, re.DOTALL))
+    mesh, folder = hemi_ellipsoid(300), tmp_path / "circles"
+    folder.mkdir()
+    about = about.replace("nefertiti", mesh.name).replace('"cem"', '"bff"')
+    (folder / "paper.toml").write_text(about.replace("harmonic-circle", "cetm"))
+    (folder / "tables.toml").write_text(tables)
+    (folder / "claims.toml").write_text(
+        stated.replace("harmonic-circle", "cetm").replace("cem", "bff")
+    )
+    (folder / "energies.csv").write_text(f"model,faces,cetm,bff\nTeapot,{mesh.m},0.5,0.4\n")
+    report = write_report(disks, tmp_path / "report", "c", paper=read_paper(folder))
+    table = next(table for table in items_of(report, Table) if table.name == "table-3")
+    (row,) = ([value.text for value in row] for row in table.rows)
+    assert (row[0], row[2], row[4]) == ("Teapot", "0.50", "0.40")
+    assert verdicts(disks, "", read_paper(folder)).keys() == {"lower-energy"}
 
 
 # OpenABF
