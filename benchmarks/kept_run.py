@@ -13,6 +13,7 @@ from cembench.core.atomic import write_text
 from cembench.core.errors import RecordError
 from cembench.results import run_folder
 from cembench.results.records import digest
+from cembench.results.store import Store
 
 #: What a kept run lacks: maps and surfaces, which a report draws, and what a run alone needs.
 LEFT_OUT = ("maps", "meshes", "samples", "lock")
@@ -49,6 +50,8 @@ def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str
                 content["digest"] = digest(content)
             write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
     if folder.is_relative_to(ROOT):
-        record(folder.relative_to(ROOT).as_posix(), MEASURING, command, None)
+        measured = [one.get("git") for one in Store(folder).environments().values()]
+        commit = max(((git or {}).get("commit") or "" for git in measured), default="")[:12]
+        record(folder.relative_to(ROOT).as_posix(), MEASURING, command, None, commit)
     size = sum(file.stat().st_size for file in files)
     return Section([f"{folder.name}: {len(files)} files, {size:,} bytes"])
