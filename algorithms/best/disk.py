@@ -9,6 +9,7 @@ from typing import Annotated
 
 from pydantic import Field
 
+from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.even_weights import evened
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -50,14 +51,15 @@ def best(
     has the smallest angle errors everywhere. direct-cem always has a valid map, with its usual
     `back` and at the least E_C; cetm has slightly better angles where the mesh has a flat metric;
     cetm-flips is better on surfaces that must be scaled very unevenly. An algorithm that would
-    probably end later than `seconds` after the start is left out. Within this time, steps whose
-    weights count all triangles alike lower the mean angle error of the best map further, until one
-    wins less than a thousandth (`even_steps`). `chosen` names the algorithm, `tried` has the mean
-    angle error of each, in degrees, before these steps.
+    probably end later than `seconds` after the start is left out. The best map is moved to the
+    Moebius gauge that is best for its angles; within this time, steps whose weights count all
+    triangles alike lower its mean angle error further, until one wins less than a thousandth
+    (`even_steps`). `chosen` names the algorithm, `tried` has the mean angle error of each, in
+    degrees, before all this.
     """
     start = perf_counter()
     found = best_of(mesh, CANDIDATES, seconds, repair=repair)
-    uv, steps = found.uv, 0
+    uv, steps = angle_gauge(mesh, found.uv), 0
     while steps < MOST_STEPS and perf_counter() - start < seconds:
         uv, taken = evened(mesh, uv, 1)
         if not taken:

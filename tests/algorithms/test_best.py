@@ -10,6 +10,7 @@ from cembench.surfaces.sheets import swiss_roll
 
 import cembench
 from cembench import AlgorithmFailed, Parameterization
+from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.even_weights import evened
 from cembench.conformal.metrics import angle_errors, flipped_triangles
 from tests.hard_surfaces import hard_surface
@@ -29,7 +30,7 @@ def test_it_is_as_good_as_the_best_candidate(mesh):
     errors = [error for error in found.extras["tried"].values() if isinstance(error, float)]
     chosen = CANDIDATES[found.extras["chosen"]].call(mesh).uv
     assert error_of(mesh, chosen) == min(errors)
-    uv, taken = evened(mesh, chosen, found.extras["even_steps"])
+    uv, taken = evened(mesh, angle_gauge(mesh, chosen), found.extras["even_steps"])
     assert taken == found.extras["even_steps"]
     np.testing.assert_array_equal(found.uv, uv)
     assert error_of(mesh, uv) <= min(errors)
