@@ -15,6 +15,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import cli_pages  # noqa: E402 - after the path
 import gallery_pictures  # noqa: E402
+import paper_pages  # noqa: E402
 
 project = "cembench"
 author = "The cembench developers"
@@ -28,7 +29,7 @@ extensions = [
     "numpydoc",
     "sphinx_gallery.gen_gallery",
 ]
-exclude_patterns = ["_build", "_ext", "_templates", "gallery/*.ipynb", "gallery/*.py"]
+exclude_patterns = ["_build", "_ext", "_pages", "_templates", "gallery/*.ipynb", "gallery/*.py"]
 
 templates_path = ["_templates"]
 needs_sphinx = "8.0"
@@ -37,6 +38,13 @@ suppress_warnings = ["config.cache"]  # the gallery's functions cannot be pickle
 # Pages are Markdown. Links to headings work down to the third level.
 myst_enable_extensions = ["colon_fence"]
 myst_heading_anchors = 3
+#: A kept run of a paper is a folder in the repository, and a page in the site.
+myst_url_schemes = {
+    "http": None,
+    "https": None,
+    "mailto": None,
+    "paper": {"url": "papers/{{path}}/index.html", "classes": ["paper"]},
+}
 
 # Pages of the API: one for each public name, its docstring in the sections of numpydoc.
 autosummary_generate = True
@@ -52,6 +60,7 @@ add_module_names = False
 html_theme = "furo"
 html_title = "cembench"
 html_static_path = ["_static", "preview.png"]
+html_extra_path = ["_pages"]  # of papers, made when the site is built
 html_css_files = ["site.css"]
 smartquotes = False  # they would make one dash of the two of an option
 html_copy_source = False
@@ -87,6 +96,8 @@ def _link_to_files(app, page, source):
 
     def link(found):
         target = (folder / found[1]).resolve()
+        if target.parent == paper_pages.KEPT:
+            return f"](paper:{target.name})"
         return found[0] if target.is_relative_to(HERE) else f"](path:{found[1]})"
 
     source[0] = re.sub(r"\]\((\.\.?/[^)#]+)\)", link, source[0])
@@ -106,8 +117,9 @@ def _skip_aliases(app, what, name, object_, skip, options):
 
 
 def setup(app):
-    """Write the page of the commands before anything is read."""
+    """Write the pages of commands and papers before anything is read."""
     cli_pages.write_page(HERE / "cli.md")
+    paper_pages.write_pages(HERE / "_pages/papers")
     app.connect("source-read", _link_to_files)
     app.connect("autodoc-process-docstring", _keep_bars)
     app.connect("autodoc-skip-member", _skip_aliases)

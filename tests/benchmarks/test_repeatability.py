@@ -1,6 +1,8 @@
 import subprocess
 import sys
 
+import pytest
+
 from benchmarks.repeatability import summary
 from tests.results.test_comparison import record_of
 
@@ -27,6 +29,7 @@ def test_the_table_tells_the_spread_and_the_false_alarms():
     assert "No A/A comparison" in told([[record_of([1.0], algorithm="cem")]])
 
 
+@pytest.mark.slow
 def test_it_measures_twins_once_and_goes_on_when_called_again(tmp_path):
     command = [sys.executable, "-m", "benchmarks", "repeatability", "--runs", "1"]
     command += ["--surfaces", "flat-disk", "--faces", "100", "--against", "harmonic-circle"]

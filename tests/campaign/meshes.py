@@ -20,6 +20,9 @@ from tests.campaign.verdict import Verdict
 #: Of so many meshes, one has its figures computed again.
 EVERY = 4
 
+#: Algorithms that try others, or end after many steps: they take one mesh of so many.
+DEAR, DEAR_EVERY = ("best", "cetm-flips-overlay", "angenent-haker"), 4
+
 #: From an algorithm and a mesh to an outcome (status, cause, notes, metrics, ...) and a map.
 Check = Callable[[Algorithm, TriangleMesh], tuple[Any, Any]]
 
@@ -30,6 +33,11 @@ class MeshCase:
 
     number: int
     algorithm: str
+
+
+def takes(number: int, algorithm: str) -> bool:
+    """Tell whether an algorithm is tried on the mesh of this number."""
+    return algorithm not in DEAR or number % DEAR_EVERY == 0
 
 
 def judge_case(seed: int, case: MeshCase, check: Check = project.check) -> tuple[str, Verdict]:

@@ -55,6 +55,10 @@ def test_the_site_is_built_without_a_warning_and_searched_offline(tmp_path):
     html = tmp_path / "html"
     page = (html / "gallery/plot_01_map_a_surface.html").read_text()
     assert "sphx_glr_plot_01_map_a_surface_001.png" in page
+    papers = (html / "papers.html").read_text()
+    for kept in sorted((ROOT / "reports/papers").iterdir()):
+        assert f'href="papers/{kept.name}/index.html"' in papers
+        assert (html / "papers" / kept.name / "index.html").is_file()
     # Nothing is loaded from elsewhere, so it is read, and searched, without a network.
     for file in (html / "index.html", html / "errors.html", html / "search.html"):
         assert not re.search(r"<(script|link|img)[^>]+(src|href)=.https?:", file.read_text())

@@ -349,6 +349,7 @@ def test_runs_that_are_merged_bring_their_surfaces(tmp_path):
     assert sorted(p.name for p in (tmp_path / "both" / "meshes").iterdir()) == sorted(names)
 
 
+@pytest.mark.slow
 def test_other_processes_draw_the_same_pictures_and_plots(monkeypatch, tmp_path):
     """One surface lies in the run, the other does not."""
     store = write_run(tmp_path / "run", ("reuse",), ("cem", "lscm"))
