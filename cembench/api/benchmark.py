@@ -428,7 +428,7 @@ def benchmark(
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
-    given, models = list(surfaces), Profile(profile) if profile else None
+    named, models = list(surfaces), Profile(profile) if profile else None
     if output is not None:
         run_folder.check(Path(output))
     check_cluster(cluster, pairing, reporter)
@@ -467,8 +467,8 @@ def benchmark(
     for algorithm in chosen:
         if why := missing(algorithm):
             reporter.note(f"{algorithm.name} is not available: {why}.")
-    given += surfaces_of(models, registry) if models else []
-    if not given and not mesh_dir and not sets:
+    named += surfaces_of(models, registry) if models else []
+    if not named and not mesh_dir and not sets:
         raise ParameterError.about(
             "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
             "{sets}; {listed} have names.",
@@ -486,7 +486,7 @@ def benchmark(
         )
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
-            *(given, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
+            *(named, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
         )
     many = gather_sets(sets, registry, chosen, limit, reporter) if sets else None
     if many is not None:

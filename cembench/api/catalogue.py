@@ -245,6 +245,6 @@ def surface(name: str, faces: int | None = None, **parameters: Any) -> TriangleM
     from cembench.registry import load_registry
 
     family = load_registry().surface(name)
-    given = parameters if faces is None else {"faces": faces, **parameters}
-    mesh: TriangleMesh = family.function(**family.arguments(given))
+    arguments = parameters if faces is None else {"faces": faces, **parameters}
+    mesh: TriangleMesh = family.function(**family.arguments(arguments))
     return mesh

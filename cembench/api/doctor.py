@@ -100,25 +100,25 @@ def _backends() -> InstallationFinding:
 
 def _plugins() -> InstallationFinding:
     try:
-        found = load_registry()
+        registry = load_registry()
     except CembenchError as error:
         return InstallationFinding("plug-ins", False, str(error), remedy="See the message.")
-    detail = f"{len(found.algorithms)} algorithms, {len(found.surfaces)} surfaces"
+    detail = f"{len(registry.algorithms)} algorithms, {len(registry.surfaces)} surfaces"
     return InstallationFinding(
-        "plug-ins", bool(found.algorithms), detail, remedy="Reinstall cembench."
+        "plug-ins", bool(registry.algorithms), detail, remedy="Reinstall cembench."
     )
 
 
 def _offered(entry: EntryPoint) -> InstallationFinding:
     """Return the finding of another package's check; a check that raises is a failed finding."""
     try:
-        found = entry.load()()
+        names = entry.load()()
     except Exception as error:  # external code may raise anything
         detail = f"{entry.value} failed: {type(error).__name__}: {error}"
         remedy = "Repair or uninstall the package that declares it."
         return InstallationFinding(entry.name, False, detail, required=False, remedy=remedy)
-    assert isinstance(found, InstallationFinding)
-    return found
+    assert isinstance(names, InstallationFinding)
+    return names
 
 
 def _datasets() -> list[InstallationFinding]:
@@ -126,13 +126,13 @@ def _datasets() -> list[InstallationFinding]:
         known = load_registry().datasets
     except CembenchError:  # reported in the line of the plug-ins
         return []
-    here = [name for name, dataset in known.items() if is_fetched(dataset)]
-    detail = f"{len(here)} of {len(known)} fetched{': ' if here else ''}{', '.join(here)}"
+    fetched = [name for name, dataset in known.items() if is_fetched(dataset)]
+    detail = f"{len(fetched)} of {len(known)} fetched{': ' if fetched else ''}{', '.join(fetched)}"
     detail += f"; kept in {cache_directory()}"
     remedy = "Run `cembench fetch NAME` for the paper's public models; stand-ins need no download."
     return [
         InstallationFinding(
-            "datasets", len(here) == len(known), detail, required=False, remedy=remedy
+            "datasets", len(fetched) == len(known), detail, required=False, remedy=remedy
         )
     ]
 

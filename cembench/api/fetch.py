@@ -116,8 +116,8 @@ def fetch(
     wanted += [one for name in group for one in registry.group(name) if one not in wanted]
     if not wanted:
         known = list(registry.datasets.values())
-        here = {one.name: one.path for one in known if is_fetched(one)}
-        return PublicSurfaces(here, [about(one) for one in known], {})
+        paths = {one.name: one.path for one in known if is_fetched(one)}
+        return PublicSurfaces(paths, [about(one) for one in known], {})
     missing = {one.path: one for one in wanted if not is_fetched(one)}
     if len(wanted) > 1:
         reporter.info(_intent(len({one.path for one in wanted}), list(missing.values())))

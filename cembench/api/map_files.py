@@ -190,27 +190,27 @@ def map_files(
         )
     if cut:
         check_takes_disks(candidates)
-    given, target = [Path(mesh) for mesh in meshes], path_of(output)
-    outputs = output_files(given, target)
+    paths, target = [Path(mesh) for mesh in meshes], path_of(output)
+    outputs = output_files(paths, target)
     named = {"geometry_image": geometry_image, "remeshed": remesh, "html": html}
     extras = {what: Path(path) for what, path in named.items() if path is not None}
     file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
-    check_options(given, outputs, file_options)
+    check_options(paths, outputs, file_options)
     is_atlas = any(a.target == "atlas" for a in candidates)
-    if is_atlas and (file_options.extras or bake or len(given) > 1):
+    if is_atlas and (file_options.extras or bake or len(paths) > 1):
         raise ParameterError.about(
             "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
             "{html} and {bake}, which need one UV per vertex.",
             name=candidates[0].name,
         )
-    sources = local_files(given, registry, reporter)
+    sources = local_files(paths, registry, reporter)
     written = list(dict.fromkeys(path for path in outputs if path is not None))
     others = [path for file in written for path in beside(file, file_options)]
     inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
     for path in (*written, *others, *file_options.extras.values()):
         refuse_inputs(path, inputs, force=overwrite)
     refuse_present(others if target in outputs else [*written, *others], force=overwrite)
-    together = target if len(given) > 1 and target in outputs else None
+    together = target if len(paths) > 1 and target in outputs else None
     files = []
     for source, place in zip(sources, outputs, strict=True):
         with reporter.busy(f"reading {source}"):

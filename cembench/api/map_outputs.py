@@ -28,7 +28,7 @@ def write_extras(
     options: FileOptions, mesh: TriangleMesh, z: NDArray[np.complex128], record: Record
 ) -> tuple[Notice, ...]:
     """Write the extra files; return notices of triangles that rounding folds in the new mesh."""
-    told: tuple[Notice, ...] = ()
+    notices: tuple[Notice, ...] = ()
     for what, path in options.extras.items():
         if what == "geometry_image":
             from cembench.api.geometry_images import write_geometry_image
@@ -37,7 +37,7 @@ def write_extras(
         elif what == "remeshed":
             from cembench.conformal.resample import regular_remesh
 
-            told = save_map(
+            notices = save_map(
                 path, *regular_remesh(mesh, z, options.side), FileOptions(options.place)
             )
         else:
@@ -45,7 +45,7 @@ def write_extras(
             from cembench.report.render.view_page import write_view_page
 
             write_view_page(path, map_page(mesh, z, record.outcome, record.title))
-    return told
+    return notices
 
 
 def check_options(

@@ -162,17 +162,17 @@ class Maps:
         return []
 
     def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
-        told: tuple[Notice, ...] = ()
+        notices: tuple[Notice, ...] = ()
         maps = self._maps(own, file.output)
         shells = Shells.of([m.surface for m in own]) if self.overlay else file.shells
         if maps and file.output is not None:
             atlas = own[0].record.target == "atlas"
-            told = write_shells(file.output, shells, maps, self.file_options, atlas=atlas)
+            notices = write_shells(file.output, shells, maps, self.file_options, atlas=atlas)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
                 equal = self.file_options.equal
                 draw_maps(shells, maps, file.picture, own[0].record, equal=equal)
-        return tuple((file.output or file.shells.path, notice) for notice in told)
+        return tuple((file.output or file.shells.path, notice) for notice in notices)
 
     def _mapped(self, file: FileJobs, surface: SurfaceFile, task: Task) -> Mapped:
         mesh, algorithm, words = surface.mesh, task.algorithm, ""
@@ -190,22 +190,22 @@ class Maps:
         mapped = Mapped(surface, record, uv, {}, certificate=proof, overlay=words)
         if uv is None or not self.writes(mapped):
             return mapped
-        told: Told = ()
+        noticed: Told = ()
         extras = self.file_options.extras
         files = {"output": file.output, **extras, "preview": file.picture}
         if extras:
             with self.reporter.busy("writing"):
                 notices = write_extras(self.file_options, mesh, uv, record)
-            told = tuple((extras.get("remeshed", surface.path), one) for one in notices)
+            noticed = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
-        return replace(mapped, written=written, told=told)
+        return replace(mapped, written=written, told=noticed)
 
 
-def _overlay(fine: TriangleMesh, given: TriangleMesh) -> str:
+def _overlay(fine: TriangleMesh, coarse: TriangleMesh) -> str:
     """Return what a refined mesh is."""
     return (
-        f"{fine.m:,} triangles, the {given.m:,} of {given.name} cut along the edges of the flipped "
-        "triangulation; the map and the files written are of this refined mesh"
+        f"{fine.m:,} triangles, the {coarse.m:,} of {coarse.name} cut along the edges of the "
+        "flipped triangulation; the map and the files written are of this refined mesh"
     )
 
 
@@ -214,9 +214,9 @@ def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
     from cembench.conformal.certificate import certificate_of
 
     try:
-        found = certificate_of(mesh, uv, record.target)
-        if found is None:
+        certificate = certificate_of(mesh, uv, record.target)
+        if certificate is None:
             return "only for maps to the disk, with circular holes or without"
-        return found.words(uv[found.corners])
+        return certificate.words(uv[certificate.corners])
     except AlgorithmFailed as error:
         return f"none: {error}"

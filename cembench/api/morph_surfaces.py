@@ -132,7 +132,7 @@ def morph(
         options = Options(timeout=timeout)
         maps = [_mapped(chosen, mesh, parameters or {}, plugins, options, tell) for mesh in meshes]
         mapped = perf_counter()
-        found = register_all(
+        registrations = register_all(
             meshes,
             maps,
             places,
@@ -143,7 +143,7 @@ def morph(
             tell=tell,
         )
     seconds = {"maps": mapped - started, "registration": perf_counter() - mapped}
-    return replace(found, seconds=seconds)
+    return replace(registrations, seconds=seconds)
 
 
 def _mapped(

@@ -64,10 +64,10 @@ def _fetch(
 ) -> str:
     """Fetch all at once, so that the limit is that of all; return why the first failed, if any."""
     try:
-        found = list(fetch_all(missing, jobs=len(missing), seconds=seconds, progress=progress))
+        downloads = list(fetch_all(missing, jobs=len(missing), seconds=seconds, progress=progress))
     except CembenchError as error:
         return _briefly(error)
-    return next((_briefly(one.error) for one in found if one.error is not None), "")
+    return next((_briefly(one.error) for one in downloads if one.error is not None), "")
 
 
 def _briefly(error: CembenchError) -> str:
@@ -91,7 +91,7 @@ def make_stand_ins(
     were, and how many were not in the cache.
     """
     new = [name for name in names if not _is_cached(registry.surface(name))]
-    found: dict[str, TriangleMesh] = {}
+    stand_ins: dict[str, TriangleMesh] = {}
     if min(jobs, len(new)) > 1:
         # A process that breaks its memory limit ends them all: one at a time needs less.
         with (
@@ -100,14 +100,14 @@ def make_stand_ins(
         ):
             waiting = {pool.submit(_make, name): name for name in new}
             for future in as_completed(waiting):
-                found[waiting[future]] = future.result()
-                made(waiting[future], len(found), len(new))
+                stand_ins[waiting[future]] = future.result()
+                made(waiting[future], len(stand_ins), len(new))
     for name in (*new, *names):
-        if name not in found:
-            found[name] = generate_surface(registry, name)
+        if name not in stand_ins:
+            stand_ins[name] = generate_surface(registry, name)
             if name in new:
-                made(name, len(found), len(new))
-    return [found[name] for name in names]
+                made(name, len(stand_ins), len(new))
+    return [stand_ins[name] for name in names]
 
 
 def _make(name: str) -> TriangleMesh:

@@ -201,13 +201,13 @@ class Result:
         """
         from cembench.conformal.certificate import certificate_of
 
-        found = certificate_of(self.mesh, self.z, self.algorithm.target)
-        if found is None:
+        certificate = certificate_of(self.mesh, self.z, self.algorithm.target)
+        if certificate is None:
             raise ParameterError(
                 f"{self.algorithm.name} on {self.mesh.name} is no map to the disk, whose modulus "
                 "is known. Take an algorithm for disks, or for holes."
             )
-        return found
+        return certificate
 
     def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
         """Return the surface sampled on a regular grid of the map.
@@ -440,11 +440,11 @@ def parameterize(
     named = [one for one in (*faces_and_algorithm, algorithm) if isinstance(one, str)]
     if len(named) > 1:
         raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
-    given: Any = (surface, *arrays) if arrays else surface
+    what: Any = (surface, *arrays) if arrays else surface
     registry = load_registry(plugins)
     names = algorithms_named(named[0] if named else None)
     candidates = [registry.algorithm(name) for name in names]
-    mesh = load_surface(given, [a.mesh_type for a in candidates], registry=registry)
+    mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     arguments = distribute_parameters([chosen], parameters)[chosen.name]
     cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))

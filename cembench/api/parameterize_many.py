@@ -84,8 +84,8 @@ def parameterize_many(
         _mapped, algorithm=algorithm, check=check, keep_invalid=keep_invalid,
         plugins=tuple(plugins), **parameters,
     )  # fmt: skip
-    found = map(one, surfaces) if jobs == 1 else _in_processes(one, surfaces, jobs)
-    return _results(found, raises=errors == "raise")
+    results = map(one, surfaces) if jobs == 1 else _in_processes(one, surfaces, jobs)
+    return _results(results, raises=errors == "raise")
 
 
 def _mapped(surface: SurfaceInput, **options: Any) -> Result | CembenchError:
@@ -96,9 +96,9 @@ def _mapped(surface: SurfaceInput, **options: Any) -> Result | CembenchError:
 
 
 def _results(
-    found: Iterator[Result | CembenchError], *, raises: bool
+    results: Iterator[Result | CembenchError], *, raises: bool
 ) -> Iterator[Result | CembenchError]:
-    for one in found:
+    for one in results:
         if raises and isinstance(one, CembenchError):
             raise one
         yield one
@@ -118,17 +118,17 @@ def _in_processes(one: Any, surfaces: Iterable[SurfaceInput], jobs: int) -> Iter
 
 def _sent(one: Any, surface: SurfaceInput) -> Any:
     """Return a result as parts that can be pickled: functions of plug-ins cannot."""
-    found = one(surface)
-    if isinstance(found, CembenchError):
-        return found
-    return found.mesh, found.algorithm.name, found.z, found.outcome
+    result = one(surface)
+    if isinstance(result, CembenchError):
+        return result
+    return result.mesh, result.algorithm.name, result.z, result.outcome
 
 
 def _received(future: Future[Any], plugins: tuple[str, ...]) -> Result | CembenchError:
-    found = future.result()
-    if isinstance(found, CembenchError):
-        return found
-    mesh, name, z, outcome = found
+    result = future.result()
+    if isinstance(result, CembenchError):
+        return result
+    mesh, name, z, outcome = result
     for array in (mesh.V, mesh.F):
         array.setflags(write=False)  # which is lost on the way
     return Result(mesh, load_registry(plugins).algorithm(name), z, outcome)

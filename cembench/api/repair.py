@@ -113,12 +113,12 @@ def repair(
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
     soup = soup_of(surface) if path is None else read_soup(path)
     try:
-        found = repair_arrays(
+        repaired = repair_arrays(
             soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
         )
         kinds = (TriangleMesh, DiskMesh, HoledMesh)  # every surface is of the first
-        soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in found.surfaces]
+        soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in repaired.surfaces]
         meshes = [prepared(one, kinds).mesh for one in soups]
     except MeshError as error:
         raise located(error, path) from None
-    return Repair(tuple(meshes), found.counts, soup.notices)
+    return Repair(tuple(meshes), repaired.counts, soup.notices)

@@ -151,7 +151,7 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
 
 
 def read_surfaces(
-    given: Iterable[Any],
+    named: Iterable[Any],
     folders: Iterable[Path],
     registry: Registry,
     algorithms: Sequence[Algorithm],
@@ -178,7 +178,7 @@ def read_surfaces(
 
     for folder in folders:
         _add_folder(folder, read, add, reporter)
-    for number, one in enumerate(given, start=1):
+    for number, one in enumerate(named, start=1):
         if is_generated(one, registry):
             meshes.append(generate_surface(registry, one, faces))
             roles |= provenances(registry, [one])
@@ -224,25 +224,25 @@ def gather_sets(
         A set is unknown, or none of its surfaces can be measured.
 
     """
-    given: list[Provided] = []
+    offered: list[Provided] = []
     with reporter.downloads([]) as progress:
         for name in dict.fromkeys(sets):
             with reporter.busy(f"reading the surfaces of {name}"):
-                given += surfaces_of_set(name, registry, limit=limit, progress=progress)
-    found = gathered(given, registry, algorithms)
-    for one in found.refused[:NAMED]:
+                offered += surfaces_of_set(name, registry, limit=limit, progress=progress)
+    surfaces = gathered(offered, registry, algorithms)
+    for one in surfaces.refused[:NAMED]:
         reporter.note(f"{one.name} is left out: {_first_problem(one.error)}")
-    more = len(found.refused) - NAMED
+    more = len(surfaces.refused) - NAMED
     if more > 0:
         reporter.note(f"{more} more are left out; the report lists them")
-    if not found.surfaces:
+    if not surfaces.surfaces:
         raise ParameterError.about(
             "{given} gives no surface that the chosen algorithms take; "
             "{fetch} shows whether files can be fetched.",
             fetch=Advice("`cembench.fetch(group=['disks'])`", "`cembench fetch --group disks`"),
             given=", ".join(sets),
         )
-    return found
+    return surfaces
 
 
 def _first_problem(error: str) -> str:

@@ -104,8 +104,8 @@ def surfaces_of_set(
         chosen = [dataset for group in GROUPS[name] for dataset in registry.group(group)]
         return _of_datasets(chosen[:limit], progress)
     for entry in entry_points(group=SETS, name=name):
-        found: Iterator[Provided] = entry.load()(registry, limit or USUAL_LIMIT)
-        return found
+        surfaces: Iterator[Provided] = entry.load()(registry, limit or USUAL_LIMIT)
+        return surfaces
     return _of_path(name, limit)
 
 
@@ -124,9 +124,9 @@ def _of_path(name: str, limit: int | None) -> Iterator[Provided]:
 
 def _of_datasets(datasets: Sequence[Dataset], progress: ShowProgress) -> Iterator[Provided]:
     with closing(fetch_all(datasets, progress=progress)) as downloads:
-        found = {one.dataset.name: one for one in downloads}
+        downloaded = {one.dataset.name: one for one in downloads}
     for dataset in datasets:
-        one = found[dataset.name]
+        one = downloaded[dataset.name]
         if one.error is not None:
             why = str(one.error)
             yield Provided(dataset.name, dataset.source_url, error=why, licence=dataset.licence)
@@ -166,7 +166,7 @@ class Gathered:
 
 
 def gathered(
-    given: Iterable[Provided], registry: Registry, algorithms: Sequence[Algorithm]
+    offered: Iterable[Provided], registry: Registry, algorithms: Sequence[Algorithm]
 ) -> Gathered:
     """Split the surfaces of sets into those that the algorithms can be measured on, and the rest.
 
@@ -175,7 +175,7 @@ def gathered(
     names, seen = Names(), set[str]()
     kinds = tuple({a.mesh_type for a in algorithms})
     surfaces, refused, roles = [], [], {}
-    for one in given:
+    for one in offered:
         if one.mesh is None:
             refused.append(one)
         elif not isinstance(one.mesh, kinds):
@@ -191,12 +191,12 @@ def gathered(
     return Gathered(tuple(surfaces), tuple(refused), MappingProxyType(roles))
 
 
-def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
+def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibit:
     """Return an exhibit that lists the surfaces of a run's sets."""
-    count = len(found.surfaces) + len(found.refused)
-    cut = sum(one.cut for one in found.surfaces)
+    count = len(collected.surfaces) + len(collected.refused)
+    cut = sum(one.cut for one in collected.surfaces)
     text = (
-        f"{', '.join(sets)}: {count} surfaces were given, {len(found.surfaces)} of them can be "
+        f"{', '.join(sets)}: {count} surfaces were given, {len(collected.surfaces)} of them can be "
         f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
         "those that can be mapped."
     )
@@ -208,16 +208,21 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
             ),
             rows=tuple(
                 (
-                    *(one.name, found.roles[one.name].family or one.name, one.mesh.n, one.mesh.m),
+                    *(
+                        one.name,
+                        collected.roles[one.name].family or one.name,
+                        one.mesh.n,
+                        one.mesh.m,
+                    ),
                     *(len(one.mesh.loops), one.source, one.licence),
                 )
-                for one in found.surfaces
+                for one in collected.surfaces
                 if one.mesh is not None
             ),
         )
     ]
-    if found.refused:
-        rows = tuple((one.name, one.error, one.source) for one in found.refused)
+    if collected.refused:
+        rows = tuple((one.name, one.error, one.source) for one in collected.refused)
         columns = ("surface", "reason", "from")
         tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
     return Exhibit(
@@ -230,7 +235,7 @@ def exhibit_of(found: Gathered, sets: Sequence[str], command: str) -> Exhibit:
         facts={
             "sets": list(sets),
             "given": count,
-            "measured": len(found.surfaces),
-            "refused": {one.name: one.error for one in found.refused},
+            "measured": len(collected.surfaces),
+            "refused": {one.name: one.error for one in collected.refused},
         },
     )

@@ -101,18 +101,18 @@ def bytes_of(memory_bytes: int | str | None) -> int:
 
     if memory_bytes is None:
         return int(0.9 * psutil.virtual_memory().available)
-    given = Setting("memory_bytes", repr(memory_bytes))
+    setting = Setting("memory_bytes", repr(memory_bytes))
     try:
         size: int = TypeAdapter(ByteSize).validate_python(memory_bytes)
     except (ValidationError, OverflowError):
         raise ParameterError.about(
-            "{given} is not a size; write a number with a unit, e.g. 4GiB or 500MB.", given=given
+            "{given} is not a size; write a number with a unit, e.g. 4GiB or 500MB.", given=setting
         ) from None
     if not LEAST_MEMORY <= size <= MOST_MEMORY:
         raise ParameterError.about(
             "{given} is {size:,} bytes; allowed: 256MiB (a process needs more than half of that to "
             "load the libraries) to 1024TiB.",
-            given=given,
+            given=setting,
             size=size,
         )
     return size

@@ -147,5 +147,5 @@ def check_submissions(
     from cembench.results.bundle import bundles_in, unpacked
 
     signers = None if require_signed is None else Path(require_signed)
-    with unpacked(bundles_in(Path(folder)), signers) as found:
-        return list(found.values())
+    with unpacked(bundles_in(Path(folder)), signers) as bundles:
+        return list(bundles.values())

@@ -103,9 +103,9 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     """
     if not folder.is_dir():
         raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
-    found = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
+    files = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
     names, manifest = Names(), read_manifest(folder)
-    for path in first(found, limit):
+    for path in first(files, limit):
         inside = path.relative_to(folder).with_suffix("").as_posix()
         row = manifest.get(inside, {})
         name = names.of(row.get("name") or inside.replace("/", "-"))
@@ -207,12 +207,12 @@ class Names:
 
     def of(self, name: str) -> str:
         """Return the name, with a number if it was used before."""
-        number, found = 1, name
-        while found in self.taken:
+        number, unused = 1, name
+        while unused in self.taken:
             number += 1
-            found = f"{name}-{number}"
-        self.taken.add(found)
-        return found
+            unused = f"{name}-{number}"
+        self.taken.add(unused)
+        return unused
 
 
 def first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
@@ -306,7 +306,7 @@ def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Pro
             return Provided(name, source, error=f"it cannot be unpacked: {error}")
         file.flush()
         place = Path(file.name)
-        found = provided(name, source, lambda: read_mesh(place, TriangleMesh).renamed(name))
+        surface = provided(name, source, lambda: read_mesh(place, TriangleMesh).renamed(name))
         return Provided(
-            name, source, found.mesh, found.error.replace(str(place), source), cut=found.cut
+            name, source, surface.mesh, surface.error.replace(str(place), source), cut=surface.cut
         )

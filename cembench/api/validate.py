@@ -112,10 +112,10 @@ def validate(
         algorithm, registry, plugins = load_solver(os.fspath(plugin))
     arguments = distribute_parameters([algorithm], parameters or {})[algorithm.name]
     options = Options(timeout=timeout)
-    given = [*(surfaces_of(Profile(profile), registry) if profile else []), *surfaces]
+    on = [*(surfaces_of(Profile(profile), registry) if profile else []), *surfaces]
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
-            *(given, map(Path, mesh_dir), registry, [algorithm], reporter),
+            *(on, map(Path, mesh_dir), registry, [algorithm], reporter),
             faces=faces,
             repair=False,
         )
@@ -135,10 +135,10 @@ def validate(
     hooks = ValidationHooks(reporter.step, lambda cells: reporter.watching(cells, resumes=False))
     solver = Solver(algorithm, plugins, arguments, in_a_process(options))
     with _folder(output) as folder:
-        found = examine(solver, registry, folder, asked, hooks)
+        validation = examine(solver, registry, folder, asked, hooks)
         if output is not None:
-            write_validation(found, folder)
-    return found
+            write_validation(validation, folder)
+    return validation
 
 
 @contextmanager
@@ -159,7 +159,7 @@ def written_files(folder: Path) -> dict[str, str]:
     return {"output": str(folder / "validation.json"), "page": str(folder / "index.html")}
 
 
-def write_validation(found: Validation, folder: Path) -> None:
+def write_validation(validation: Validation, folder: Path) -> None:
     """Write a validation to a folder as JSON and HTML.
 
     Raises
@@ -175,8 +175,8 @@ def write_validation(found: Validation, folder: Path) -> None:
 
     try:
         with draft_folder(folder) as draft:
-            write_model(draft / "validation.json", found)
-            write_html(document_of(found, folder, draft), draft)
+            write_model(draft / "validation.json", validation)
+            write_html(document_of(validation, folder, draft), draft)
             folders.publish(draft, folder, "validation")
     except OSError as error:
         raise unwritable(folder, error) from error

@@ -107,10 +107,10 @@ def write_shells(
         moved = packed(maps, areas_of(shells.parts), equal=options.equal)
     elif atlas:
         mesh = shells.parts[0].mesh
-        found = cut_map(mesh, maps[0].reshape(-1, 3))
-        uv = placed(found.uv, options.place)
-        soup = Soup.of_triangles(mesh.V, mesh.F, uv, found.surface.F, name=mesh.name)
-        return _save(output, [soup], found.uv, options)
+        cut = cut_map(mesh, maps[0].reshape(-1, 3))
+        uv = placed(cut.uv, options.place)
+        soup = Soup.of_triangles(mesh.V, mesh.F, uv, cut.surface.F, name=mesh.name)
+        return _save(output, [soup], cut.uv, options)
     else:
         moved = [placed(maps[0], options.place)]
     uv, corners = shells.joined(moved)
@@ -237,8 +237,8 @@ def _folded_by_rounding(output: Path, z: Complex, soup: Soup) -> tuple[Notice, .
         return ()
     precision = "single precision" if single else "the unit square"
     remedy = "write OBJ, VTP or NPZ" if single else "UVs in the disk (uv: disk) stay as they are"
-    told = (
+    notices = (
         f"{count} of {len(F)} triangles are so small in the map that rounding to {precision} folds "
         f"or flattens them; {remedy}"
     )
-    return (Notice(NoticeKind.FOLDED_BY_ROUNDING, told),)
+    return (Notice(NoticeKind.FOLDED_BY_ROUNDING, notices),)

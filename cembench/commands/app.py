@@ -87,15 +87,15 @@ def load(word: str = "") -> None:
 
 def descriptions() -> dict[str, str]:
     """Return the first sentence of each command's help, read without importing its module."""
-    found: dict[str, str] = {}
+    lines: dict[str, str] = {}
     for module, verbs in MODULES.items():
         of_papers = entry_points(group="cembench.verbs") if module == "exhibits" else ()
-        found |= {verb: _first_line(f"cembench.{where}") for verb, where in verbs.items()}
-        found |= {
+        lines |= {verb: _first_line(f"cembench.{where}") for verb, where in verbs.items()}
+        lines |= {
             entry.name: _first_line(f"{entry.value}:{entry.name}")
             for entry in sorted(of_papers, key=lambda entry: entry.name)
         }
-    return found
+    return lines
 
 
 def _first_line(function: str) -> str:

@@ -51,19 +51,19 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Print the figures of the cells that were asked for; exit with 1 if one did not end ok."""
-    given = call.keywords
+    keywords = call.keywords
     declared, named = declared_command(command, program)
     measured = call(
         surfaces=[*mesh, *split(dataset), *split(surfaces)],
-        algorithms=[*(given["algorithms"] or ["usual"]), *named],
-        plugins=[*given["plugins"], *declared],
+        algorithms=[*(keywords["algorithms"] or ["usual"]), *named],
+        plugins=[*keywords["plugins"], *declared],
         output=output,
         reporter=SHOWN,
     )
-    if given["dry_run"]:
+    if keywords["dry_run"]:
         _print_plan(measured.plan, as_json=as_json)
     else:
-        _print_run(measured, given["reference"], as_json=as_json)
+        _print_run(measured, keywords["reference"], as_json=as_json)
 
 
 def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:

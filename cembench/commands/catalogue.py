@@ -29,29 +29,29 @@ def list_(
     """Print what is registered as tables."""
     from cembench.report.listings import algorithms_table, surfaces_table
 
-    found = call(reporter=SHOWN)
+    entries = call(reporter=SHOWN)
     if as_json:
-        print_json(found.as_dict())
+        print_json(entries.as_dict())
         return
-    if found.algorithms is not None:
-        out.print(algorithms_table(found.algorithms, verbose=verbose))
-        if found.peers:
-            words = f"\nSolvers by others (see `cembench peers`): {', '.join(found.peers)}"
+    if entries.algorithms is not None:
+        out.print(algorithms_table(entries.algorithms, verbose=verbose))
+        if entries.peers:
+            words = f"\nSolvers by others (see `cembench peers`): {', '.join(entries.peers)}"
             out.print(words, style="dim")
-        if found.surfaces is not None:
+        if entries.surfaces is not None:
             out.print()
-    if found.surfaces is not None:
-        out.print(surfaces_table(found.surfaces, verbose=verbose))
-    known = {name: facts for name, facts in found.facts.items() if facts}
+    if entries.surfaces is not None:
+        out.print(surfaces_table(entries.surfaces, verbose=verbose))
+    known = {name: facts for name, facts in entries.facts.items() if facts}
     if known:
         from cembench.report.surface_facts import facts_table
 
         out.print()
         out.print(facts_table(known))
-    missing = len(found.facts) - len(known)
+    missing = len(entries.facts) - len(known)
     if missing:
         out.print(
-            f"\n{missing} of {len(found.facts)} stand-ins are not measured yet: "
+            f"\n{missing} of {len(entries.facts)} stand-ins are not measured yet: "
             "run `cembench list surfaces --measure` (takes minutes).",
             style="dim",
         )

@@ -35,7 +35,7 @@ def hours(
     groups = grouped([task for task in tasks if id(task) in known])
     priced = [[known[id(task)] for task in group] for group in groups]
     whole = sum(one.seconds for group in priced for one in group)
-    found: dict[int, float] = {}
+    by_workers: dict[int, float] = {}
     seconds: list[float] = []
     for machines in ESTIMATED_FOR:
         share = None if budget is None else budget * machines / (whole or 1.0)
@@ -43,10 +43,10 @@ def hours(
             planned_seconds(g, None if share is None else share * sum(one.seconds for one in g))
             for g in priced
         ]
-        found[machines] = makespan(seconds, machines)
+        by_workers[machines] = makespan(seconds, machines)
     longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
     return {
-        "seconds": found,
+        "seconds": by_workers,
         "units": len(groups),
         "useful": most_useful(seconds),
         "longest": None if longest is None else longest[1][0].cell.mesh,
@@ -54,18 +54,20 @@ def hours(
     }
 
 
-def show_hours(found: dict[str, Any]) -> None:
+def show_hours(estimate: dict[str, Any]) -> None:
     """Print what :func:`hours` found."""
     from cembench.commands.progress import duration
 
-    if not found["units"]:
+    if not estimate["units"]:
         return
     out.print("\nOn a cluster, where a surface under a policy is one machine's as a whole:")
-    for machines, seconds in found["seconds"].items():
-        limited = machines > 1 and seconds <= 1.01 * found["longest_seconds"]
-        limit = f", as long as {found['longest']} takes" if limited else ""
+    for machines, seconds in estimate["seconds"].items():
+        limited = machines > 1 and seconds <= 1.01 * estimate["longest_seconds"]
+        limit = f", as long as {estimate['longest']} takes" if limited else ""
         name = "machine " if machines == 1 else "machines"
         out.print(f"{machines:>6} {name}  about {duration(seconds)}{limit}", soft_wrap=True)
-    longest, useful = duration(found["longest_seconds"]), f"{found['useful']:,}"
-    most = f"more than {useful} machines gain nothing" if found["useful"] > 1 else "one is enough"
-    out.print(f"The longest of {found['units']:,} takes about {longest}: {most}", soft_wrap=True)
+    longest, useful = duration(estimate["longest_seconds"]), f"{estimate['useful']:,}"
+    most = (
+        f"more than {useful} machines gain nothing" if estimate["useful"] > 1 else "one is enough"
+    )
+    out.print(f"The longest of {estimate['units']:,} takes about {longest}: {most}", soft_wrap=True)

@@ -226,7 +226,7 @@ def split(names: list[str]) -> list[str]:
     return [part.strip() for name in names for part in name.split(",") if part.strip()]
 
 
-def assignments(given: Sequence[str]) -> dict[str, str]:
+def assignments(texts: Sequence[str]) -> dict[str, str]:
     """Return the parameters that ``-p NAME=VALUE`` sets.
 
     Raises
@@ -236,7 +236,7 @@ def assignments(given: Sequence[str]) -> dict[str, str]:
 
     """
     pairs = {}
-    for assignment in given:
+    for assignment in texts:
         name, equals, value = assignment.partition("=")
         if not equals or not name:
             raise ParameterError(f"-p {assignment!r} is not of the form NAME=VALUE.")

@@ -53,13 +53,13 @@ def _add(entry: EntryPoint) -> None:
         run_folder.check(run)
         for name in surfaces[1:]:  # a wrong one ends the command before the first takes its time
             module.loaded(name, **call.keywords)
-        found = [call(name, run=run, reporter=SHOWN) for name in surfaces]
+        made = [call(name, run=run, reporter=SHOWN) for name in surfaces]
         names = " ".join(Path(name).name for name in surfaces)
-        shown = module.shown(found, exhibits.command(verb, names, "", **call.keywords))
+        shown = module.shown(made, exhibits.command(verb, names, "", **call.keywords))
         for exhibit in shown:
             exhibits.write_exhibit(run, exhibit)
         if as_json:
-            print_json(module.facts(found))
+            print_json(module.facts(made))
         else:
             for exhibit in shown:
                 out.print(exhibit.title, style="bold", markup=False)
@@ -67,7 +67,7 @@ def _add(entry: EntryPoint) -> None:
                 out.print(exhibit.text, markup=False)
             folder = (run / exhibits.FOLDER).resolve()
             out.print(f"\nExhibits: {folder}", soft_wrap=True, markup=False)
-        fail(module.failures(found))
+        fail(module.failures(made))
 
 
 for entry in sorted(entry_points(group="cembench.verbs"), key=lambda entry: entry.name):

@@ -110,23 +110,23 @@ def _end_of(error: Exception) -> NoReturn:
         error.reword(NAMES)
         complain(str(error))
         sys.exit(BAD_USAGE)
-    told = "".join(traceback.format_exception(error))
+    trace = "".join(traceback.format_exception(error))
     if isinstance(error, OSError):
         where = f"{os.fspath(error.filename)!r}: " if error.filename is not None else ""
         message = f"{where}{error.strerror or error}. The operating system refused the access."
         code = SYSTEM
     else:
         message = f"internal error in cembench: {type(error).__name__}: {error}. "
-        message += "Please report it, with " + _kept(told)
+        message += "Please report it, with " + _kept(trace)
         code = FAULT
     complain(message)
     if DEBUG in os.environ:
         with suppress(OSError):
-            sys.stderr.write(told)
+            sys.stderr.write(trace)
     sys.exit(code)
 
 
-def _kept(told: str) -> str:
+def _kept(trace: str) -> str:
     """Write a traceback to a file; return where it is, or how to show it."""
     if DEBUG not in os.environ:
         with (
@@ -139,7 +139,7 @@ def _kept(told: str) -> str:
                 errors="backslashreplace",
             ) as file,
         ):
-            file.write(told)
+            file.write(trace)
             return f"the traceback in {file.name}."
     return f"the traceback that {DEBUG}=1 prints."
 

@@ -50,8 +50,8 @@ def declared_command(command: str | None, settings: list[str]) -> tuple[list[str
         if settings:
             raise ParameterError(f"--program {settings[0]} needs --command COMMAND.")
         return [], []
-    given = {"command": command, "folder": str(Path.cwd())}
-    plugin = COMMAND + json.dumps(given | dict(_setting(one) for one in settings))
+    declared = {"command": command, "folder": str(Path.cwd())}
+    plugin = COMMAND + json.dumps(declared | dict(_setting(one) for one in settings))
     (spec,) = declared_by(plugin)
     if spec.name in load_registry().algorithms:
         raise ParameterError(

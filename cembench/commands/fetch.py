@@ -14,17 +14,17 @@ from cembench.commands.from_api import Call, from_api
 @from_api(fetch_surfaces, without=("reporter",), names="NAME")
 def fetch(call: Call, *, as_json: Json = False) -> None:
     """Print the paths, or all surfaces if none was asked for; exit with 1 if one failed."""
-    found = call(reporter=SHOWN)
+    fetched = call(reporter=SHOWN)
     if as_json:
-        print_json(found.rows)
+        print_json(fetched.rows)
     elif not (call.keywords["names"] or call.keywords["group"]):
-        _list(found.rows)
+        _list(fetched.rows)
     else:
-        for row in found.rows:
+        for row in fetched.rows:
             only = " (no licence stated: do not redistribute)" if row["fetch_only"] else ""
             if "error" not in row:
                 out.print(f"{row['name']}: {row['path']}{only}", soft_wrap=True)
-    fail(map(str, found.failed.values()))
+    fail(map(str, fetched.failed.values()))
 
 
 def _list(rows: list[dict[str, object]]) -> None:

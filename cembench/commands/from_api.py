@@ -190,13 +190,13 @@ def _kind(argument: Argument) -> Any:
     return next((k for k in (str, bool, int, float) if k in argument.kinds), str)
 
 
-def _value(argument: Argument, given: Any) -> Any:
+def _value(argument: Argument, passed: Any) -> Any:
     """Return a value of the command line as the function takes it."""
-    if not isinstance(given, list | tuple):
-        return given
+    if not isinstance(passed, list | tuple):
+        return passed
     if _is_mapping(argument):
-        return assignments(given)
-    items = split(list(given)) if _is_split(argument) else given
+        return assignments(passed)
+    items = split(list(passed)) if _is_split(argument) else passed
     return items or argument.default
 
 

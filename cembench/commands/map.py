@@ -44,12 +44,12 @@ def map_(
 ) -> None:
     """Print each map when it is made; exit with 1 if one is not valid or a file is missing."""
     declared, named = declared_command(command, program)
-    given = call.keywords
-    if named and given["algorithm"]:
+    keywords = call.keywords
+    if named and keywords["algorithm"]:
         raise ParameterError("-a and --command both name an algorithm; give only one of them.")
     maps = call(
-        algorithm=named[0] if named else given["algorithm"],
-        plugins=[*given["plugins"], *declared],
+        algorithm=named[0] if named else keywords["algorithm"],
+        plugins=[*keywords["plugins"], *declared],
         reporter=SHOWN,
     )
     for mapped in maps:

@@ -63,7 +63,7 @@ def morph(
     from cembench.results import run_folder
     from cembench.running.plan import provenances
 
-    chosen_views, given = split([views]), call.keywords
+    chosen_views, keywords = split([views]), call.keywords
     check_views(chosen_views)
     sources = [Path(name) for name in surfaces] + ([landmarks] if landmarks else [])
     for place in output:
@@ -73,40 +73,40 @@ def morph(
     if run is not None:
         run_folder.check(run)
     try:
-        found = call(surfaces, landmarks, reporter=SHOWN)
+        morphed = call(surfaces, landmarks, reporter=SHOWN)
     except AlgorithmFailed as error:
         complain(str(error))
         raise typer.Exit(1) from None
-    seconds = dict(found.seconds)
+    seconds = dict(morphed.seconds)
     figures: dict[str, Any] = {
-        "surfaces": [mesh.name for mesh in found.meshes],
-        "landmarks": list(found.landmarks.names),
-        "algorithm": given["algorithm"],
-        "lambda": given["lam"],
-        "reach": given["reach"],
+        "surfaces": [mesh.name for mesh in morphed.meshes],
+        "landmarks": list(morphed.landmarks.names),
+        "algorithm": keywords["algorithm"],
+        "lambda": keywords["lam"],
+        "reach": keywords["reach"],
         "frames": frames,
-    } | found.metrics(frames)
+    } | morphed.metrics(frames)
     kinds = {"frames": [o for o in output if not is_film(o)], "film": [*filter(is_film, output)]}
     written = list(output)
     with SHOWN.busy("writing") as tell:
         for kind, places in kinds.items():
             if places:
                 with _timed(seconds, kind):
-                    write_path(found, places, frames, chosen_views, size, tell)
+                    write_path(morphed, places, frames, chosen_views, size, tell)
         if run is not None:
             words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
-            words += ["-a", given["algorithm"]]
-            words += [] if given["faces"] is None else ["--faces", str(given["faces"])]
+            words += ["-a", keywords["algorithm"]]
+            words += [] if keywords["faces"] is None else ["--faces", str(keywords["faces"])]
             command = f"cembench morph {' '.join(words)} --run {run}"
-            registry = load_registry(given["plugins"])
+            registry = load_registry(keywords["plugins"])
             roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
             rows = tuple(roles[name].paper_row if name in roles else "" for name in surfaces)
             for paper in entry_points(group="cembench.exhibits", name="morph"):
-                written += paper.load()(run, found, figures, command, rows, tell)
+                written += paper.load()(run, morphed, figures, command, rows, tell)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
-    _print(figures, found.landmarks.names)
+    _print(figures, morphed.landmarks.names)
     for path in written:
         print_pair("written", path)
     if not written:

@@ -73,16 +73,16 @@ def peers(
 
     run_folder.check(output)
     folders.check(output / "report", "report")
-    given = call.keywords
+    keywords = call.keywords
     declared, named = declared_command(command, program)
-    plugins = [*given["plugins"], *declared]
+    plugins = [*keywords["plugins"], *declared]
     registry = registry_with(plugins, SHOWN)
-    asked = list(given["algorithms"] or ())
+    asked = list(keywords["algorithms"] or ())
     wanted = [registry.algorithm(name) for name in [*asked, *named]]
     chosen = wanted if asked else [*_usual(registry), *wanted]
     lacking = {a.name: why for a in chosen if (why := missing(a))}
     measured = call(
-        [*mesh, *(split(surfaces) or ([] if mesh or given["mesh_dir"] else USUAL))],
+        [*mesh, *(split(surfaces) or ([] if mesh or keywords["mesh_dir"] else USUAL))],
         algorithms=[a.name for a in chosen if a.name not in lacking],
         plugins=plugins,
         pairing="separate",

@@ -52,13 +52,13 @@ def repair(
     check_writable_format(output, with_uv=False)
     refuse_inputs(output, [mesh], force=force)
     with SHOWN.busy("repairing"):
-        found = call(mesh)
+        repaired = call(mesh)
     files = [output]
-    if len(found.meshes) > 1:
-        files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(found.meshes) + 1)]
+    if len(repaired.meshes) > 1:
+        files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(repaired.meshes) + 1)]
         refuse_present(files, force=force)
     about: list[dict[str, Any]] = []
-    for path, surface in zip(files, found.meshes, strict=True):
+    for path, surface in zip(files, repaired.meshes, strict=True):
         write_mesh(path, surface)
         about.append(
             {
@@ -70,11 +70,11 @@ def repair(
             }
         )
     if as_json:
-        print_json({"input": str(mesh), "steps": found.steps, "surfaces": about})
+        print_json({"input": str(mesh), "steps": repaired.steps, "surfaces": about})
         return
-    for notice in found.notices:
+    for notice in repaired.notices:
         note(f"{mesh.stem}: {notice}")
-    print_steps(found.steps)
+    print_steps(repaired.steps)
     for one in about:
         out.print(
             f"{one['output']}: {one['vertices']:,} vertices, {one['faces']:,} triangles, "

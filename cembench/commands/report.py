@@ -65,12 +65,12 @@ def summary(report: Report, folder: Path) -> dict[str, Any]:
 
     claims = {claim.name: claim.verdict for claim in items_of(report, Claim)}
     counts = Counter(claims.values())
-    found = report.findings
+    findings = report.findings
     return {
         "title": report.title,
         "paper": report.paper and report.paper.model_dump(include=CITATION),
-        "findings": [plain(sentence) for sentence in found.sentences] if found else [],
-        "suspects": list(found.suspects) if found else [],
+        "findings": [plain(sentence) for sentence in findings.sentences] if findings else [],
+        "suspects": list(findings.suspects) if findings else [],
         "report": str(folder),
         "html": str(folder / "index.html"),
         "markdown": str(folder / "report.md"),

@@ -21,11 +21,13 @@ def reproduce(call: Call, *, as_json: Json = False) -> None:
     from cembench.running.environment import usable_cores
 
     with resumable():
-        found = call(jobs=usable_cores(), reporter=SHOWN)
-    folder, records = found.run.folder / "report", found.run.asked
+        reproduction = call(jobs=usable_cores(), reporter=SHOWN)
+    folder, records = reproduction.run.folder / "report", reproduction.run.asked
     if as_json:
-        about = summary(found.report, folder)
-        print_json({"surfaces": dict(found.surfaces), "cells": rows(records), "report": about})
+        about = summary(reproduction.report, folder)
+        print_json(
+            {"surfaces": dict(reproduction.surfaces), "cells": rows(records), "report": about}
+        )
     else:
-        show_report(found.report, folder)
+        show_report(reproduction.report, folder)
     fail(failures(records))

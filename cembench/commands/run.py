@@ -147,21 +147,21 @@ def show(
     from cembench.results.verify import Depth, sound_records, verify_map
 
     store = Store(run)
-    found = _chosen(sound_records(store, Depth.records), cell)
+    records = _chosen(sound_records(store, Depth.records), cell)
     findings = [
-        f for record in found for f in verify_map(store, store.record_file(record.cell), record)
+        f for record in records for f in verify_map(store, store.record_file(record.cell), record)
     ]
     if as_json:
-        print_json([row(record) for record in found])
+        print_json([row(record) for record in records])
     else:
-        _show_records(found)
+        _show_records(records)
     fail(str(finding) for finding in findings if finding.disagrees)
 
 
-def _show_records(found: list[Record]) -> None:
+def _show_records(records: list[Record]) -> None:
     from cembench.report.record_table import figures_table
 
-    for record in found:
+    for record in records:
         outcome = record.outcome
         print_pair(outcome.status, f"{record.cell.solves}  {record.cell.key[:12]}")
         out.print(figures_table(record))
@@ -263,17 +263,17 @@ def merge(
         sound_records(Store(run), depth)
     if (output / "records").is_dir():
         sound_records(into, depth)
-    found = merged([Store(run) for run in runs], into)
+    joined = merged([Store(run) for run in runs], into)
     used = sorted({record.environment for record in into.records()})
     environments = into.environments()
     machines = sorted({machine_of(environments.get(key, {})) for key in used})
     if as_json:
-        told = {"output": str(output), "cells": found.cells, "environments": used}
-        conflicts = [asdict(conflict) for conflict in found.conflicts]
-        print_json(told | {"machines": machines, "conflicts": conflicts})
+        summary = {"output": str(output), "cells": joined.cells, "environments": used}
+        conflicts = [asdict(conflict) for conflict in joined.conflicts]
+        print_json(summary | {"machines": machines, "conflicts": conflicts})
     else:
-        out.print(f"{found.cells} cells in {output}", soft_wrap=True)
-        _show_conflicts(found.conflicts, output)
+        out.print(f"{joined.cells} cells in {output}", soft_wrap=True)
+        _show_conflicts(joined.conflicts, output)
     if len(used) > 1:
         warn(
             f"measured in {len(used)} environments, on {len(machines)} machines; only ratios "
@@ -320,12 +320,12 @@ def export(
     path = output or run / f"rows.{form.value}"
     if is_own(run, path):
         raise ParameterError(f"-o {path} is one of the run's own files; name another file.")
-    found = rows(sound_records(Store(run), Depth.everything if verify else Depth.records))
-    export_rows(found, path, form)
+    exported = rows(sound_records(Store(run), Depth.everything if verify else Depth.records))
+    export_rows(exported, path, form)
     if as_json:
-        print_json({"output": str(path), "rows": len(found)})
+        print_json({"output": str(path), "rows": len(exported)})
     else:
-        out.print(f"{len(found)} rows in {path}", soft_wrap=True)
+        out.print(f"{len(exported)} rows in {path}", soft_wrap=True)
 
 
 @dataclass(frozen=True)
@@ -353,8 +353,8 @@ def _state(store: Store, record: Record | None, cell: Cell) -> CellState:
 
 def _chosen(records: list[Record], wanted: str) -> list[Record]:
     by_name = [r for r in records if f"{r.cell.mesh}/{r.cell.algorithm}" == wanted]
-    found = by_name or [r for r in records if wanted and r.cell.key.startswith(wanted)]
-    if not found:
+    records_of = by_name or [r for r in records if wanted and r.cell.key.startswith(wanted)]
+    if not records_of:
         known = ", ".join(dict.fromkeys(f"{r.cell.mesh}/{r.cell.algorithm}" for r in records))
         raise RecordError(f"no cell {wanted!r} in this run; it holds: {known or 'nothing'}.")
-    return found
+    return records_of

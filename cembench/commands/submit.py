@@ -27,11 +27,11 @@ if TYPE_CHECKING:
 @from_api(api.submit, author="--author NAME", licence="--licence SPDX")
 def submit(call: Call, *, as_json: Json = False) -> None:
     """Print what was packed."""
-    found = call()
+    submission = call()
     if as_json:
-        print_json(asdict(found) | {"output": str(call.keywords["output"])})
+        print_json(asdict(submission) | {"output": str(call.keywords["output"])})
         return
-    out.print(f"{found.cells} cells, {found.maps} with maps: {call.keywords['output']}")
+    out.print(f"{submission.cells} cells, {submission.maps} with maps: {call.keywords['output']}")
 
 
 @app.command(epilog="Example:  cembench submissions check submissions --require-signed signers")
@@ -49,26 +49,26 @@ def submissions(
     its files, its times and, where maps were sent, their figures are checked.
     """
     with err.status("checking", spinner="line"):
-        found = api.check_submissions(folder, require_signed=require_signed)
+        checked = api.check_submissions(folder, require_signed=require_signed)
     if markdown:
         from cembench.report.document import Section
         from cembench.report.render.markdown import append_section
 
-        append_section(markdown, Section("submissions", "Submissions", (_table(found),)))
+        append_section(markdown, Section("submissions", "Submissions", (_table(checked),)))
     if as_json:
-        print_json([asdict(one) | {"accepted": one.accepted} for one in found])
+        print_json([asdict(one) | {"accepted": one.accepted} for one in checked])
     else:
-        out.print(_table(found))
-    if not all(one.accepted for one in found):
+        out.print(_table(checked))
+    if not all(one.accepted for one in checked):
         raise typer.Exit(1)
 
 
-def _table(found: Sequence[Submission]) -> Table:
+def _table(checked: Sequence[Submission]) -> Table:
     from cembench.report.document import Column, Table, words
 
     return Table.of(
         "submissions",
-        f"{sum(one.accepted for one in found)} of {len(found)} bundles accepted",
+        f"{sum(one.accepted for one in checked)} of {len(checked)} bundles accepted",
         [
             *(Column(title, numeric=False) for title in ("bundle", "found", "machines")),
             *(Column(title, form=",d") for title in ("cells", "maps")),
@@ -83,12 +83,12 @@ def _table(found: Sequence[Submission]) -> Table:
                 one.maps,
                 one.signer or "-",
             ]
-            for one in found
+            for one in checked
         ],
         notes=tuple(
             f"{one.name}: {'; '.join(one.faults[:5])}"
             + (f"; and {len(one.faults) - 5} more" if len(one.faults) > 5 else "")
-            for one in found
+            for one in checked
             if one.faults
         ),
     )
@@ -128,11 +128,11 @@ def publish(
 
     with accepted(sent) as unpacked:
         signers = check_signed([*own, *unpacked], require_signed)
-        found = write_site([*own, *unpacked], output, progress, signers)
+        site = write_site([*own, *unpacked], output, progress, signers)
     if as_json:
-        print_json({"output": str(output), "runs": [asdict(one) for one in found]})
+        print_json({"output": str(output), "runs": [asdict(one) for one in site]})
     else:
-        out.print(f"{len(found)} runs in {output / 'index.html'}", soft_wrap=True)
+        out.print(f"{len(site)} runs in {output / 'index.html'}", soft_wrap=True)
 
 
 @app.command(epilog="Example:  cembench sign results/may --key ~/.ssh/id_ed25519")
@@ -158,7 +158,7 @@ def check_signed(runs: Iterable[Path], signers: Path | None) -> dict[Path, str]:
     """
     from cembench.results.signing import signer
 
-    found = {} if signers is None else {run: signer(run, signers) for run in runs}
-    for run, name in found.items():
+    names = {} if signers is None else {run: signer(run, signers) for run in runs}
+    for run, name in names.items():
         err.print(f"{run}: signed by {name}", markup=False, style="dim", soft_wrap=True)
-    return found
+    return names

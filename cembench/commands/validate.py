@@ -62,31 +62,35 @@ def validate(
         from cembench.validation.summaries import check_junit
 
         check_junit(junit)
-    found = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
+    validation = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
     folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
     if as_json:
-        print_json(_as_json(found, written))
+        print_json(_as_json(validation, written))
     else:
         from cembench.validation.document import validation_text
 
-        out.print(validation_text(found))
+        out.print(validation_text(validation))
         for path in written.values():
             out.print(path, style="dim", markup=False, soft_wrap=True)
     if markdown or junit:
         from cembench.validation.summaries import append_markdown, write_junit
 
         if markdown:
-            append_markdown(found, markdown)
+            append_markdown(validation, markdown)
         if junit:
-            write_junit(found, junit)
-    if not found.passed:
+            write_junit(validation, junit)
+    if not validation.passed:
         raise typer.Exit(1)
 
 
-def _as_json(found: Validation, written: dict[str, str]) -> dict[str, Any]:
+def _as_json(validation: Validation, written: dict[str, str]) -> dict[str, Any]:
     """Return the validation as data for JSON output."""
     from cembench.validation.verdict import sentence
 
-    said = {"valid": found.valid, "passed": found.passed, "verdict": sentence(found)}
-    return said | found.model_dump(mode="json") | written
+    verdict = {
+        "valid": validation.valid,
+        "passed": validation.passed,
+        "verdict": sentence(validation),
+    }
+    return verdict | validation.model_dump(mode="json") | written

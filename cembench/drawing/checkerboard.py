@@ -60,18 +60,18 @@ class Checkerboard:
         across, up = np.floor(places.max(axis=0)).astype(np.int64) - low + 1
         board = np.full(int(across * up), -1, dtype=np.int64)
         node = _roots(places, low, int(across))
-        here, start, depth = np.arange(len(places)), 0, 0
+        active, start, depth = np.arange(len(places)), 0, 0
         for level in range(MOST_LEVELS):
             size = len(board)
-            weight = np.bincount(node[here], weights[here], minlength=size)
-            total = np.bincount(node[here], (weights * fineness)[here], minlength=size)
+            weight = np.bincount(node[active], weights[active], minlength=size)
+            total = np.bincount(node[active], (weights * fineness)[active], minlength=size)
             divided = np.flatnonzero((total > level * weight) & (np.arange(size) >= start))
             if not len(divided):
                 break
             board[divided] = size + FINER**2 * np.arange(len(divided))
             board = np.concatenate([board, np.full(FINER**2 * len(divided), -1, dtype=np.int64)])
-            here = here[board[node[here]] >= 0]
-            node[here] = board[node[here]] + _part(places[here], level + 1)
+            active = active[board[node[active]] >= 0]
+            node[active] = board[node[active]] + _part(places[active], level + 1)
             start, depth = size, level + 1
         return cls(low, int(across), board, depth)
 
@@ -84,14 +84,14 @@ class Checkerboard:
         node = np.clip(_roots(places, self.low, self.across), 0, roots - 1)
         dark = _is_dark(places, 0)
         level = np.zeros(len(places), dtype=np.int64)
-        here = np.flatnonzero(self.first_part[node] >= 0)
-        while len(here):
-            depth = int(level[here[0]]) + 1
-            level[here] = depth
-            dark[here] = _is_dark(places[here], depth)
-            parts = self.first_part[node[here]] + _part(places[here], depth)
-            node[here] = parts
-            here = here[self.first_part[parts] >= 0]
+        active = np.flatnonzero(self.first_part[node] >= 0)
+        while len(active):
+            depth = int(level[active[0]]) + 1
+            level[active] = depth
+            dark[active] = _is_dark(places[active], depth)
+            parts = self.first_part[node[active]] + _part(places[active], depth)
+            node[active] = parts
+            active = active[self.first_part[parts] >= 0]
         return dark, level
 
 

@@ -189,9 +189,9 @@ def _fitted(text: str, style: Style, pixels: float, width: float) -> tuple[list[
 
     for count, least in ((1, EASY), (2, SMALLEST)):
         lines = _broken(text, count)
-        found = fits(lines, least)
-        if found is not None:
-            return lines, found
+        size = fits(lines, least)
+        if size is not None:
+            return lines, size
     while len(text) > 1 and fits(_broken(text + " …", 2), SMALLEST) is None:
         text = text[: int(0.9 * len(text))]
     return _broken(text + " …", 2), fits(_broken(text + " …", 2), SMALLEST) or pixels * SMALLEST
@@ -200,11 +200,11 @@ def _fitted(text: str, style: Style, pixels: float, width: float) -> tuple[list[
 @cache
 def _font(pixels: float, *, bold: bool) -> ImageFont.FreeTypeFont:
     """Load the font that comes with matplotlib, without importing matplotlib."""
-    found = find_spec("matplotlib")
-    assert found is not None
-    assert found.origin is not None
+    spec = find_spec("matplotlib")
+    assert spec is not None
+    assert spec.origin is not None
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    fonts = Path(found.origin).parent / "mpl-data" / "fonts" / "ttf"
+    fonts = Path(spec.origin).parent / "mpl-data" / "fonts" / "ttf"
     plain = ImageFont.Layout.BASIC  # the other layout engine loads a library for complex scripts
     return ImageFont.truetype(str(fonts / name), max(pixels, 4.0), layout_engine=plain)
 

@@ -152,11 +152,11 @@ class _Triangles:
         row = pixel // self.size
         x = pixel - row * self.size - self.corner[0][face]
         y = row - self.corner[1][face]
-        found = np.empty((len(face), 3))
+        weights = np.empty((len(face), 3))
         for k in (1, 2):
-            found[:, k] = x * self.across[k][face] + y * self.down[k][face]
-        found[:, 0] = 1 - found[:, 1] - found[:, 2]
-        return found
+            weights[:, k] = x * self.across[k][face] + y * self.down[k][face]
+        weights[:, 0] = 1 - weights[:, 1] - weights[:, 2]
+        return weights
 
 
 def _portions(candidates: Ints) -> list[Ints]:

@@ -210,8 +210,8 @@ def read_mesh(
     """
     soup = read_soup(path, arrays=arrays, polygons=polygons)
     kinds: Any = (DiskMesh, HoledMesh) if mesh_type is None else (mesh_type,)
-    found: M = most_special(soup, kinds, Path(path))
-    return found
+    mesh: M = most_special(soup, kinds, Path(path))
+    return mesh
 
 
 def most_special(soup: Soup, kinds: Sequence[type[M]], path: Path | None = None) -> M:

@@ -62,8 +62,8 @@ class Footer(Declaration):
         """Return the aggregate as an entry; `lacking` says why there is none without numbers."""
         if not len(numbers):
             return missing(lacking)
-        found = self.of(numbers)
-        return Value(worded(found, self.form), found, "derived")
+        value = self.of(numbers)
+        return Value(worded(value, self.form), value, "derived")
 
 
 #: The geometric mean of a column of ratios.
@@ -160,12 +160,12 @@ def _footer_rows(
 ) -> list[tuple[Value, ...]]:
     lines, counts = [], [words("n, surfaces counted"), words("")]
     for footer in footers:
-        found = [_numbers(rows, columns, k, footer) for k in range(2, len(columns))]
+        figures = [_numbers(rows, columns, k, footer) for k in range(2, len(columns))]
         lacking = "nothing to compare" if footer.over else "no figure in this column"
-        cells = (words("") if n is None else footer.entry(n, lacking) for n in found)
+        cells = (words("") if n is None else footer.entry(n, lacking) for n in figures)
         lines.append((words(footer.label), words(""), *cells))
         if footer is footers[0]:
-            counts += [words("") if n is None else count(len(n)) for n in found]
+            counts += [words("") if n is None else count(len(n)) for n in figures]
     return [*lines, tuple(counts)]
 
 
@@ -185,14 +185,14 @@ def _numbers(
 
 def _places(columns: Sequence[Column], rows: Sequence[Sequence[Value]]) -> dict[str, str]:
     """Return the places of each cause of a gap, misprint or unstable time, as text."""
-    found: dict[str, list[str]] = {}
+    surfaces: dict[str, list[str]] = {}
     for row in rows:
         for column, value in zip(columns, row, strict=True):
             if value.why:
                 paired = column.title in ("printed", "here")
                 where = f"{row[0].text} / {column.group if paired else column.title}"
-                found.setdefault(value.why, []).append(where)
-    return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in found.items()}
+                surfaces.setdefault(value.why, []).append(where)
+    return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in surfaces.items()}
 
 
 def _sizes(paper: Paper, surfaces: Sequence[MeasuredSurface]) -> list[str]:

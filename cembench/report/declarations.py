@@ -57,15 +57,15 @@ def parsed(declared: Mapping[str, Any], kind: type[D], where: str) -> dict[str, 
     """
     if not isinstance(declared, Mapping):
         raise ParameterError(f"{where}: write each declaration as a table of its own, [NAME].")
-    found = {}
+    entries = {}
     for name, table in declared.items():
         try:
-            found[name] = kind.model_validate(table)
+            entries[name] = kind.model_validate(table)
         except ValidationError as error:
             first = error.errors()[0]
             place = " / ".join([name, *map(str, first["loc"])])
             raise ParameterError(f"{where}, {place}: {first['msg']}.") from error
-    return found
+    return entries
 
 
 def filled(text: str, known: Mapping[str, Any]) -> str:

@@ -122,8 +122,8 @@ class DeclaredColumn(Declaration):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, given: Any) -> Any:
-        return {"column": given} if isinstance(given, str) else given
+    def _named(cls, value: Any) -> Any:
+        return {"column": value} if isinstance(value, str) else value
 
     @model_validator(mode="after")
     def _known(self) -> DeclaredColumn:
@@ -240,15 +240,15 @@ def declared_table(
     if spec.sort:
         frame = frame.sort_values(["place", *spec.sort], kind="stable", na_position="last")
     once = " Each model counts once, and is preferred over its stand-in."
-    told = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(frame))}
-    told |= {"surfaces": str(frame["place"].nunique())}
-    told |= {"once": once if evidence.stand_ins_left_out else ""}
-    told |= {"reference": evidence.reference_label, **texts}
+    known = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(frame))}
+    known |= {"surfaces": str(frame["place"].nunique())}
+    known |= {"once": once if evidence.stand_ins_left_out else ""}
+    known |= {"reference": evidence.reference_label, **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
-        return _of_surfaces(evidence, spec, frame, surfaces, called or name, told, below)
-    columns, entries = zip(*_columns(evidence, spec, frame, told), strict=True)
-    title, caption = filled(spec.title, told), filled(spec.caption, told)
+        return _of_surfaces(evidence, spec, frame, surfaces, called or name, known, below)
+    columns, entries = zip(*_columns(evidence, spec, frame, known), strict=True)
+    title, caption = filled(spec.title, known), filled(spec.caption, known)
     return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
 
@@ -334,21 +334,21 @@ def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> V
         return of_status(_NAMES[name](row, record), record=row["key"], why=cause)
     if name in _NAMES:
         return words(_NAMES[name](row, record))
-    found = COLUMNS[name].of(record)
-    if one.words or isinstance(found, str):
-        return words(str(found or "-"))
+    value = COLUMNS[name].of(record)
+    if one.words or isinstance(value, str):
+        return words(str(value or "-"))
     return figure_entry(evidence, record, COLUMNS[name])
 
 
 def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
-    found = evaluate(one.value, group)
+    value = evaluate(one.value, group)
     if one.words:
-        return words("-" if found is None else str(found))
+        return words("-" if value is None else str(value))
     key = str(evaluate(one.record, group) or "") if one.record else ""
-    if isinstance(found, str):
-        return Value(found, None, "derived")
+    if isinstance(value, str):
+        return Value(value, None, "derived")
     form = (lambda _: filled_in(one.text, group)) if one.text else partial(worded, form=one.form)
-    return entry(found, form, one.lacking, record=key)
+    return entry(value, form, one.lacking, record=key)
 
 
 def _named_rows(frame: pd.DataFrame) -> list[dict[str, Any]]:

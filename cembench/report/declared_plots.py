@@ -59,8 +59,8 @@ class DeclaredAxis(Declaration):
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, given: Any) -> Any:
-        return {"value": given} if isinstance(given, str) else given
+    def _named(cls, value: Any) -> Any:
+        return {"value": value} if isinstance(value, str) else value
 
     def axis(self) -> Axis:
         """Return the axis as it is drawn."""
@@ -126,11 +126,13 @@ class DeclaredPlot(Declaration):
 
     @model_validator(mode="before")
     @classmethod
-    def _spread(cls, given: Any) -> Any:
-        if not isinstance(given, Mapping) or not isinstance(given.get("panels", []), list):
-            return given
-        shared = {key: value for key, value in given.items() if key in DeclaredPanel.model_fields}
-        own = {key: value for key, value in given.items() if key not in shared}
+    def _spread(cls, declared: Any) -> Any:
+        if not isinstance(declared, Mapping) or not isinstance(declared.get("panels", []), list):
+            return declared
+        shared = {
+            key: value for key, value in declared.items() if key in DeclaredPanel.model_fields
+        }
+        own = {key: value for key, value in declared.items() if key not in shared}
         panels = own.get("panels", [{}])
         return own | {"panels": [shared | p if isinstance(p, dict) else p for p in panels]}
 
@@ -160,9 +162,9 @@ def further(
     """
     sections = []
     for number, path in enumerate(paths, start=1):
-        given = dict(read(path))
-        plots = parsed(given.pop("plots", {}), DeclaredPlot, f"{path}, plots")
-        tables = parsed(given, DeclaredTable, str(path))
+        declarations = dict(read(path))
+        plots = parsed(declarations.pop("plots", {}), DeclaredPlot, f"{path}, plots")
+        tables = parsed(declarations, DeclaredTable, str(path))
         items: list[Plot | Item | None] = []
         both: Iterable[tuple[str, Any]] = (*tables.items(), *plots.items())
         for name, one in both:
@@ -366,8 +368,8 @@ def _evaluated(spec: DeclaredPanel, frame: pd.DataFrame) -> pd.DataFrame:
         tooltip = evaluate(spec.tooltip, group) if spec.tooltip else ""
         part = pd.DataFrame({"x": x, "y": y, "tooltip": tooltip}, index=group.index)
         parts.append(part if isinstance(y, pd.Series) else part.iloc[:1])
-    found = pd.concat(parts[1:] or parts)
-    points = valid.loc[found.index].assign(**{str(name): found[name] for name in found})
+    rows = pd.concat(parts[1:] or parts)
+    points = valid.loc[rows.index].assign(**{str(name): rows[name] for name in rows})
     points = points[points["x"].notna() & points["y"].notna()]
     try:
         return points.astype({"y": float})

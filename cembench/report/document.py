@@ -379,8 +379,8 @@ def heading(column: Column) -> str:
 
 def groups_of(columns: Sequence[Column]) -> list[tuple[str, int]]:
     """Return the headings of groups with their numbers of columns; empty without groups."""
-    found = [(name, len(list(run))) for name, run in groupby(column.group for column in columns)]
-    return found if any(name for name, _ in found) else []
+    lengths = [(name, len(list(run))) for name, run in groupby(column.group for column in columns)]
+    return lengths if any(name for name, _ in lengths) else []
 
 
 def is_prose(table: Table, place: int) -> bool:

@@ -44,8 +44,8 @@ def datasets_table(datasets: Sequence[Mapping[str, Any]]) -> Table:
     for d in datasets:
         faces = "-" if d["faces"] is None else d["faces"]
         size = "-" if d["size"] is None else bytes_text(d["size"])
-        here = "yes" if d["fetched"] else "no"
-        rows.append([d["name"], d["group"] or "-", faces, size, d["licence"], here])
+        fetched = "yes" if d["fetched"] else "no"
+        rows.append([d["name"], d["group"] or "-", faces, size, d["licence"], fetched])
     columns = [*_columns("dataset", "group"), Column("faces"), Column("size")]
     columns += _columns("licence", "here")
     return Table.of("datasets", "", columns, rows)

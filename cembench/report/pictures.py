@@ -145,9 +145,9 @@ def embed_vector(path: Path) -> Embedded | None:
 
 
 def _svg_side(head: str, side: str) -> float | None:
-    found = re.search(rf'\s{side}="([\d.]+)([a-z]*)"', head)
-    unit = _SVG_UNITS.get(found.group(2)) if found else None
-    return float(found.group(1)) * unit if found and unit else None
+    match = re.search(rf'\s{side}="([\d.]+)([a-z]*)"', head)
+    unit = _SVG_UNITS.get(match.group(2)) if match else None
+    return float(match.group(1)) * unit if match and unit else None
 
 
 def unreadable(path: Path, error: Exception) -> RenderError:

@@ -72,14 +72,14 @@ def _angles(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> pd.Da
         frame["key"], frame["mesh_hash"], frame["label"], strict=True
     ):
         held = seen.get(of_surface)
-        found = held.angles.get(label) if held else angles_of(evidence, evidence.by_key[key])
-        if found is None:
+        angles = held.angles.get(label) if held else angles_of(evidence, evidence.by_key[key])
+        if angles is None:
             continue
-        middles = ((np.arange(len(found.shares)) + 0.5) * BIN).round(6)
+        middles = ((np.arange(len(angles.shares)) + 0.5) * BIN).round(6)
         bins = frame[frame["key"] == key]
         bins = bins.loc[bins.index.repeat(len(middles))]
-        bins = bins.assign(angle=middles, corners=100 * found.shares)
-        parts.append(bins.assign(below_one_degree=found.below_one))
+        bins = bins.assign(angle=middles, corners=100 * angles.shares)
+        parts.append(bins.assign(below_one_degree=angles.below_one))
     return pd.concat(parts) if parts else frame.iloc[:0].assign(angle=(), corners=())
 
 
@@ -119,9 +119,9 @@ def printed(evidence: Evidence, *_: Any) -> pd.DataFrame:
                     row |= {one.column: value if one.only in ("", algorithm) else None}
                     row |= {f"{one.column}_table": table}
             rows.append(row)
-    found = pd.DataFrame(rows).astype(dict.fromkeys(_figures(paper), float))
+    frame = pd.DataFrame(rows).astype(dict.fromkeys(_figures(paper), float))
     figures = evidence.frame.select_dtypes("number").columns
-    return found.reindex(columns=found.columns.union(figures, sort=False))
+    return frame.reindex(columns=frame.columns.union(figures, sort=False))
 
 
 def _figures(paper: Paper) -> set[str]:

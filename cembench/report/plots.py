@@ -282,17 +282,17 @@ def _tick(value: float) -> str:
 
 
 def _draw_legend(canvas: Canvas) -> None:
-    found: dict[str, Any] = {}
+    entries: dict[str, Any] = {}
     for axes in canvas.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
-    if found:
+            entries.setdefault(label, handle)
+    if entries:
         across = max(2, int(canvas.get_figwidth() / 1.35))
         canvas.legend(
-            list(found.values()),
-            list(found),
+            list(entries.values()),
+            list(entries),
             loc="outside lower center",
-            ncols=min(len(found), across),
+            ncols=min(len(entries), across),
             frameon=False,
             fontsize=8.5,
         )

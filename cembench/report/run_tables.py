@@ -67,24 +67,24 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
     known = references(records, reference)
     bases = [(record, known.get(circumstances(record.cell))) for record in records]
     compared = [
-        (record, found)
+        (record, comparison)
         for record, base in bases
         if base is not None and base.cell.algorithm != record.cell.algorithm
-        if (found := compare(record, base)) is not None
+        if (comparison := compare(record, base)) is not None
     ]
     if not compared:
         return None
     title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
     several = len({record.cell.solves for record, _ in compared}) > 1
     compared_by_name = [
-        (record.cell.mesh, named(record), f" ({record.cell.solves})" if several else "", found)
-        for record, found in compared
+        (record.cell.mesh, named(record), f" ({record.cell.solves})" if several else "", comparison)
+        for record, comparison in compared
     ]
-    if all(found.verdict == FEW_ROUNDS for _, found in compared):
+    if all(comparison.verdict == FEW_ROUNDS for _, comparison in compared):
         names = list(dict.fromkeys(name for _, name, _, _ in compared_by_name))
         lines: dict[str, dict[str, float]] = {}
-        for mesh, name, policy, found in compared_by_name:
-            lines.setdefault(mesh + policy, {})[name] = found.speedup
+        for mesh, name, policy, comparison in compared_by_name:
+            lines.setdefault(mesh + policy, {})[name] = comparison.speedup
         note = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
             f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
@@ -92,7 +92,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         columns = [SURFACE, *(Column(n, form=".2f", lacking="not timed") for n in names)]
         rows = [[mesh, *map(line.get, names)] for mesh, line in lines.items()]
         return Table.of("speedups", title, columns, rows, notes=(note,))
-    together = corrected([found for _, found in compared])
+    together = corrected([comparison for _, comparison in compared])
     return Table.of(
         "speedups",
         title,
@@ -104,7 +104,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
             [mesh, name + policy, one.speedup, _interval(one.speedup_interval, " to "), one.verdict]
             for (mesh, name, policy, _), one in zip(compared_by_name, together, strict=True)
         ],
-        notes=tuple(_corrected_words([found for _, found in compared])),
+        notes=tuple(_corrected_words([comparison for _, comparison in compared])),
     )
 
 
@@ -114,9 +114,9 @@ def _interval(interval: Interval | None, to: str) -> Value:
     return words(f"{interval.low:.2f}{to}{interval.high:.2f}")
 
 
-def _corrected_words(found: Sequence[Comparison]) -> Iterator[str]:
+def _corrected_words(comparisons: Sequence[Comparison]) -> Iterator[str]:
     """Yield a note on the correction of the verdicts, and its effect."""
-    tested = [one for one in found if one.interval is not None]
+    tested = [one for one in comparisons if one.interval is not None]
     if len(tested) < 2:
         return
     lost = sum(
@@ -134,7 +134,7 @@ def changes_table(changes: Sequence[Change]) -> Table:
 
     The ratio is corrected for the drift of the reference kernel, if both runs timed it.
     """
-    found = [change.comparison for change in changes]
+    comparisons = [change.comparison for change in changes]
     return Table.of(
         "changes",
         "",
@@ -148,9 +148,9 @@ def changes_table(changes: Sequence[Change]) -> Table:
                 *(one.outcome.median_seconds for one in (change.before, change.after)),
                 *(together.ratio, _interval(together.interval, "-"), together.verdict),
             ]
-            for change, together in zip(changes, corrected(found), strict=True)
+            for change, together in zip(changes, corrected(comparisons), strict=True)
         ],
-        notes=(_drift_words(changes), *_corrected_words(found)),
+        notes=(_drift_words(changes), *_corrected_words(comparisons)),
     )
 
 

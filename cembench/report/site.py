@@ -111,7 +111,7 @@ def publish(
         raise ParameterError("publish takes at least one run; name each run once.")
     folders.check(folder, "report")
     names = distinct_slugs({str(place): place.name for place in places})
-    found, entrants = [], []
+    published, entrants = [], []
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         with draft_folder(folder) as draft:
@@ -119,16 +119,16 @@ def publish(
                 name = names[str(places[k])]
                 progress(name, k, len(runs))
                 evidence = Evidence.of(run)
-                found.append(_publish_one(evidence, name, draft))
+                published.append(_publish_one(evidence, name, draft))
                 entrants.append(Entrant(name, evidence, signers.get(run, "")))
             progress("index", len(runs), len(runs))
-            found.sort(key=lambda one: (one.date, one.name))
-            _write_index(found, draft)
+            published.sort(key=lambda one: (one.date, one.name))
+            _write_index(published, draft)
             _write_leaderboard(entrants, draft)
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
-    return found
+    return published
 
 
 def _publish_one(evidence: Evidence, name: str, draft: Path) -> PublishedRun:
@@ -191,7 +191,7 @@ def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None
     {}
 
     """
-    found: dict[str, list[HeadlineRatio | None]] = {}
+    by_series: dict[str, list[HeadlineRatio | None]] = {}
     for name in sorted({name for run in runs for name in run.ratios}):
         having = [set(run.ratios[name]) for run in runs if name in run.ratios]
         common = set.intersection(*having)
@@ -204,26 +204,26 @@ def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None
             chosen = common or set(own)
             average = exp(mean(log(own[place]) for place in sorted(chosen)))
             row.append(HeadlineRatio(average, len(chosen), bool(common)))
-        found[name] = row
-    return found
+        by_series[name] = row
+    return by_series
 
 
 def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
     from cembench.report.render.html import environment, template_text
 
-    told = history(runs)
-    if len(runs) > 1 and told:
-        write_plot(_plot(runs, told), draft)
+    ratios = history(runs)
+    if len(runs) > 1 and ratios:
+        write_plot(_plot(runs, ratios), draft)
     page = (
         environment()
         .get_template("site.html")
         .render(
             runs=runs,
-            history=told,
+            history=ratios,
             reference=REFERENCE,
             style=template_text("site.css"),
-            drawn=len(runs) > 1 and bool(told),
-            starred=any(one and not one.common for row in told.values() for one in row),
+            drawn=len(runs) > 1 and bool(ratios),
+            starred=any(one and not one.common for row in ratios.values() for one in row),
             version=installed_version(),
         )
     )
@@ -237,10 +237,10 @@ def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:
     write_html(leaderboard(ordered, "cembench publish"), draft / "leaderboard")
 
 
-def _plot(runs: Sequence[PublishedRun], told: Mapping[str, list[HeadlineRatio | None]]) -> Plot:
-    styles = series_styles(list(told))
+def _plot(runs: Sequence[PublishedRun], ratios: Mapping[str, list[HeadlineRatio | None]]) -> Plot:
+    styles = series_styles(list(ratios))
     series = []
-    for name, row in told.items():
+    for name, row in ratios.items():
         points = [
             Point(k, one.ratio, f"{run.name}, {run.date}")
             for k, (run, one) in enumerate(zip(runs, row, strict=True), start=1)

@@ -91,16 +91,16 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
     place, mapper = _place(surface), _mapper(registry)
     _check_writable(place.parent)
     mesh = generate_surface(registry, surface.name)
-    found = mapper.function(mesh, **mapper.arguments({}))
+    mapped = mapper.function(mesh, **mapper.arguments({}))
     thumbnail = place.with_suffix(".png")
-    write_thumbnail(mesh, found.uv, thumbnail)
+    write_thumbnail(mesh, mapped.uv, thumbnail)
     facts = SurfaceFacts(
         mesh=mesh_facts(mesh, **_standing(registry, surface)),
         mesh_hash=mesh.hash,
         code_hash=code_hash(mapper),
-        iterations=found.iterations,
-        metrics=all_metrics(mesh, found.uv),
-        **factor_spans(mesh, found.uv),
+        iterations=mapped.iterations,
+        metrics=all_metrics(mesh, mapped.uv),
+        **factor_spans(mesh, mapped.uv),
         thumbnail=str(thumbnail),
     )
     write_model(place, facts)

@@ -137,7 +137,7 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
 def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:
     """Check that unusual meshes give a map, or an error with a cause."""
     bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
-    said = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
+    causes = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
     without = [m.mesh.name for m in mapped if m.outcome.gave_up]
     right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"
     if without:
@@ -146,7 +146,7 @@ def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:
         stage="contract",
         name="awkward meshes",
         ok=not bad,
-        measured="; ".join(said) or right,
+        measured="; ".join(causes) or right,
         allowed="a finite map, or AlgorithmFailed with the cause, on any mesh of its type",
         remedy="raise cembench.AlgorithmFailed if the method does not apply.",
     )

@@ -87,7 +87,7 @@ def _arrays(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict
 
     """
     order = _byte_order(content)
-    found: dict[str, NDArray[Any]] = {}
+    arrays: dict[str, NDArray[Any]] = {}
     unpacked = 0
     for kind, element in _elements(content[_HEADER_BYTES:], order):
         begin, size = element, 0
@@ -100,16 +100,16 @@ def _arrays(content: bytes, is_wanted: Callable[[str, list[int]], bool]) -> dict
                 f"it cannot be read as MAT: an element of type {kind} where an array is expected"
             )
         name, shape, flags = _head(_elements(begin, order), order)
-        if is_wanted(name, shape if _is_numeric(flags) else []) and name not in found:
+        if is_wanted(name, shape if _is_numeric(flags) else []) and name not in arrays:
             unpacked += size or len(element)
             check_room(f"variable {name!r} with those before it", unpacked, COPIES)
             whole = element if begin is element else _inflated_whole(element, size + 8)[8:]
-            found[name] = _matrix(whole, order)
+            arrays[name] = _matrix(whole, order)
         elif begin is not element:
             _check_compressed(element, size + 8)
         else:  # check it all the same: damage there suggests more damage elsewhere
             deque(_elements(element, order), maxlen=0)
-    return found
+    return arrays
 
 
 def _byte_order(content: bytes) -> str:

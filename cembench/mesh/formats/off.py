@@ -82,10 +82,10 @@ def _statements(file: Iterator[str]) -> _Lines:
 
 def _next(lines: _Lines, missing: str) -> tuple[int, list[str]]:
     """Return the next line; an error with the text `missing` if there is none."""
-    found = next(lines, None)
-    if found is None:
+    line = next(lines, None)
+    if line is None:
         raise damaged(missing)
-    return found
+    return line
 
 
 def _declared(lines: _Lines) -> tuple[int, int, bool]:
@@ -114,15 +114,15 @@ def _declared(lines: _Lines) -> tuple[int, int, bool]:
 def _numbers(kind: type[M], number: int, words: list[str], count: int) -> list[M]:
     """Return the first `count` numbers of a line; the rest, e.g. a colour, must be numbers too."""
     try:
-        found = [kind(word) for word in words[:count]]
+        numbers = [kind(word) for word in words[:count]]
         for word in words[count:]:
             float(word)
         refuse_underscores(words)
     except ValueError as error:
         raise damaged(f"line {number}, {shown(' '.join(words))}: {error}") from None
-    if len(found) < count:
+    if len(numbers) < count:
         raise damaged(
             f"line {number}, {shown(' '.join(words))}: {count} numbers are needed, but "
-            f"{len(found)} were found"
+            f"{len(numbers)} were found"
         )
-    return found
+    return numbers

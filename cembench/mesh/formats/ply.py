@@ -367,13 +367,13 @@ def _walk_rows(
             if at + least_bytes > end:
                 raise _ends_within(element, row)
             if unpack is not None:
-                (found,) = unpack(body.data, at)
+                (count,) = unpack(body.data, at)
                 at += least_bytes
-                size = int(found) if 0 <= found <= end else -1
-                if size < 0 or size != found:
+                size = int(count) if 0 <= count <= end else -1
+                if size < 0 or size != count:
                     raise damaged(
                         f"list {element.properties[k].name!r} of {element.name!r} {row} (counted "
-                        f"from 0) declares {found} items"
+                        f"from 0) declares {count} items"
                     )
             if k in starts:
                 starts[k].append(at)

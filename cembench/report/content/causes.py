@@ -52,19 +52,20 @@ def with_causes(evidence: Evidence, frame: pd.DataFrame) -> pd.DataFrame:
     crowding = {key: one.crowding for key, one in evidence.difficulties.items()}
     facts = pd.DataFrame.from_dict(shapes, orient="index", dtype=float)
     names = ["obtuse_share", "chord_share", "angle_defect", "boundary_excess"]
-    found = frame.join(facts.reindex(columns=names), on="mesh_hash").copy()  # in one piece
-    valid = found[ANGLE].where(found["ok"])
-    found = found.assign(
-        boundary_crowding=found["mesh_hash"].map(crowding).astype(float),
-        best_error=valid.groupby(found["place"]).transform("min"),
+    described = frame.join(facts.reindex(columns=names), on="mesh_hash").copy()  # in one piece
+    valid = described[ANGLE].where(described["ok"])
+    described = described.assign(
+        boundary_crowding=described["mesh_hash"].map(crowding).astype(float),
+        best_error=valid.groupby(described["place"]).transform("min"),
         failing=[
-            [] if ok else [label] for ok, label in zip(found["ok"], found["label"], strict=True)
+            [] if ok else [label]
+            for ok, label in zip(described["ok"], described["label"], strict=True)
         ],
-        poor=found["ok"] & (found["target"] == DISK) & ~found["as_good"],
+        poor=described["ok"] & (described["target"] == DISK) & ~described["as_good"],
     )
-    held = {name: evaluate(one.where, found).astype(bool) for name, one in causes().items()}
-    return found.assign(
-        causes=[[name for name in held if held[name].loc[row]] for row in found.index]
+    held = {name: evaluate(one.where, described).astype(bool) for name, one in causes().items()}
+    return described.assign(
+        causes=[[name for name in held if held[name].loc[row]] for row in described.index]
     )
 
 
@@ -73,12 +74,12 @@ def by_cause(evidence: Evidence, frame: pd.DataFrame) -> list[tuple[str, pd.Data
 
     A group has what helps in its column `help`.
     """
-    found = with_causes(evidence, frame)
+    described = with_causes(evidence, frame)
     groups = [
-        (one.title, found[[name in row for row in found["causes"]]].assign(help=one.help))
+        (one.title, described[[name in row for row in described["causes"]]].assign(help=one.help))
         for name, one in causes().items()
     ]
-    groups.append((NONE, found[[not row for row in found["causes"]]].assign(help="-")))
+    groups.append((NONE, described[[not row for row in described["causes"]]].assign(help="-")))
     return [(title, group) for title, group in groups if len(group)]
 
 

@@ -119,13 +119,13 @@ class Evidence:
         kept = _latest(records)
         exhibits = tuple(read_exhibits(run))
         older = {record.cell.key for record in records} - {record.cell.key for record in kept}
-        found = cls(store, tuple(kept), exhibits, frozenset(older), paper)
-        if paper is not None and paper.models and not found.models:
+        evidence = cls(store, tuple(kept), exhibits, frozenset(older), paper)
+        if paper is not None and paper.models and not evidence.models:
             raise RecordError(
                 f"no surface of {run} is, or stands in for, a model of {paper.title!r}; its models "
                 f"are {', '.join(paper.models)}. Ask for another paper, or for none."
             )
-        return found
+        return evidence
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave out what was computed: another thread may be filling that in while this is sent."""
@@ -212,13 +212,13 @@ class Evidence:
     @cached_property
     def difficulties(self) -> dict[str, Difficulty]:
         """The difficulty of each surface that has a map to the disk, by its hash."""
-        best, found = self.best_maps, {}
+        best, by_surface = self.best_maps, {}
         for of_surface, key in best["key"][best["target"] == DISK].items():
             mesh = self.mesh(self.by_hash[str(of_surface)])
             uv = self.uv(self.by_key[key])
             if mesh is not None and uv is not None and (one := difficulty(mesh, uv)):
-                found[str(of_surface)] = one
-        return found
+                by_surface[str(of_surface)] = one
+        return by_surface
 
     @cached_property
     def shapes(self) -> dict[str, Shape]:
@@ -253,7 +253,7 @@ class Evidence:
 
         order = self.paper.models
         public = {one.mesh_hash: one.name for one in load_registry().datasets.values()}
-        found: dict[str, MeasuredSurface] = {}
+        surfaces: dict[str, MeasuredSurface] = {}
         for record in self.records:
             facts = record.mesh
             name = public.get(record.cell.mesh_hash, record.cell.mesh)
@@ -261,7 +261,7 @@ class Evidence:
             if row not in order:
                 row = self.paper.model_of(name, facts.faces)
                 origin = "model" if row else "surface"
-            found[record.cell.mesh_hash] = MeasuredSurface(
+            surfaces[record.cell.mesh_hash] = MeasuredSurface(
                 name=record.cell.mesh,
                 mesh_hash=record.cell.mesh_hash,
                 vertices=facts.vertices,
@@ -276,7 +276,7 @@ class Evidence:
         def place(s: MeasuredSurface) -> tuple[int, int, str]:
             return (order.index(s.paper_row) if s.paper_row else len(order), s.faces, s.name)
 
-        return tuple(sorted(found.values(), key=place))
+        return tuple(sorted(surfaces.values(), key=place))
 
     @property
     def families(self) -> int:
@@ -320,7 +320,7 @@ class Evidence:
             variants.setdefault(name, Counter())[choice] += 1
             about[name] = record
         titles = Counter(record.title for record in about.values())
-        found = []
+        series = []
         for name in sorted(variants, key=lambda n: (self._place(n), n)):
             choices = [choice for choice, _ in variants[name].most_common()]
             for k, choice in enumerate(choices):
@@ -328,8 +328,8 @@ class Evidence:
                 if titles[title] > 1:
                     title = f"{title} ({name})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
-                found.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
-        return tuple(found)
+                series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
+        return tuple(series)
 
     def _place(self, algorithm: str) -> int:
         known = self.paper.algorithms
@@ -354,27 +354,27 @@ class Evidence:
         A cell on a model of the paper with the parameters as printed belongs to the series that
         other surfaces have with the usual ones, unless the run has that choice there too.
         """
-        given = {r.cell.key: _variant(r.cell, r.cell.parameters) for r in self.records}
+        variants = {r.cell.key: _variant(r.cell, r.cell.parameters) for r in self.records}
         chosen = {
-            (r.cell.algorithm, given[r.cell.key], m)
+            (r.cell.algorithm, variants[r.cell.key], m)
             for r in self.records
             for m in (r.cell.mesh_hash, r.mesh.origin)
         }
-        found = {}
+        differing = {}
         for r in self.records:
-            name, own = r.cell.algorithm, given[r.cell.key]
+            name, own = r.cell.algorithm, variants[r.cell.key]
             usual = _variant(r.cell, self.paper.as_elsewhere(name, r.cell.parameters))
             separate = (name, usual, r.cell.mesh_hash) in chosen or any(
                 (name, own, origin) in chosen for origin in ("stand-in", "surface")
             )
-            found[r.cell.key] = own if r.mesh.origin != "model" or separate else usual
-        return found
+            differing[r.cell.key] = own if r.mesh.origin != "model" or separate else usual
+        return differing
 
     @cached_property
     def styles(self) -> dict[str, SeriesStyle]:
         """Colour, marker and dash of each series by its label, the same in every plot."""
-        found = series_styles([s.name for s in self.series])
-        return {s.label: found[s.name] for s in self.series}
+        styles = series_styles([s.name for s in self.series])
+        return {s.label: styles[s.name] for s in self.series}
 
     def find(
         self, surface: MeasuredSurface, series: AlgorithmSeries, policy: str | None = None
@@ -402,26 +402,26 @@ class Evidence:
         It is the reference with its main parameters on the same surface and with the same policy.
         """
         pairs = ((record, self.base(record)) for record in self.records)
-        found = {one.cell.key: compare(one, base) for one, base in pairs if base is not None}
-        return {key: one for key, one in found.items() if one is not None}
+        compared = {one.cell.key: compare(one, base) for one, base in pairs if base is not None}
+        return {key: one for key, one in compared.items() if one is not None}
 
     def _compared(self, key: str) -> dict[str, Any]:
-        found = self.comparisons.get(key)
-        interval = found and found.speedup_interval
+        comparison = self.comparisons.get(key)
+        interval = comparison and comparison.speedup_interval
         return {
-            "comparison": found,
-            "speedup": found and found.speedup,
+            "comparison": comparison,
+            "speedup": comparison and comparison.speedup,
             "speedup_low": interval and interval.low,
             "speedup_high": interval and interval.high,
-            "verdict": found and found.verdict,
-            "ratio": found and found.ratio,
-            "paired": found.rounds if found else 0,
+            "verdict": comparison and comparison.verdict,
+            "ratio": comparison and comparison.ratio,
+            "paired": comparison.rounds if comparison else 0,
         }
 
     def rate(self, record: Record) -> float | None:
         """Return t / t_reference - 1 for a record's time t, the median ratio within rounds."""
-        found = self.comparisons.get(record.cell.key)
-        return None if found is None else found.speedup
+        comparison = self.comparisons.get(record.cell.key)
+        return None if comparison is None else comparison.speedup
 
     def base(self, record: Record) -> Record | None:
         """Return the reference's record for comparing times; None for that record itself."""

@@ -89,7 +89,7 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
     good = [one for one in order if as_good(angles[one], least)]
     good.sort(key=lambda one: _over_families(seconds[one], families).mean)
     against = {one: _over_families(angles[one] / angles[best], families) for one in others}
-    sure = {o for o, found in against.items() if found.interval and found.interval.low > 1}
+    sure = {o for o, speeds in against.items() if speeds.interval and speeds.interval.low > 1}
     known: dict[str, Any] = {
         **{"order": order, "best": best, "others": others, "good": good, "angle_mean": means[best]},
         **{"n": len(common), "surfaces": len(wide), "families": len(set(families))},
@@ -113,11 +113,11 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
         if not known["few"]:
             around = [share_interval(share, known["families"]) for share in known["smallest"]]
             known["shares"] = [(100 * one.low, 100 * one.high) for one in around]
-    found = _speeds(evidence, keys, good, families) if len(good) > 1 else None
-    known |= {"rounds": found.rounds if found else 0, "verdict": found and found.verdict}
+    speeds = _speeds(evidence, keys, good, families) if len(good) > 1 else None
+    known |= {"rounds": speeds.rounds if speeds else 0, "verdict": speeds and speeds.verdict}
     known |= {
-        "speeds": _ends(found.interval if found else None),
-        "speed_ratio": found and found.ratio,
+        "speeds": _ends(speeds.interval if speeds else None),
+        "speed_ratio": speeds and speeds.ratio,
     }
     for name, cases in own("findings.toml").items():
         if others or name not in _OF_SEVERAL:
@@ -129,8 +129,8 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
 _OF_SEVERAL = ("head", "certainty")
 
 
-def _ends(found: Interval | None) -> tuple[float, float] | None:
-    return (found.low, found.high) if found else None
+def _ends(interval: Interval | None) -> tuple[float, float] | None:
+    return (interval.low, interval.high) if interval else None
 
 
 def _over_families(values: pd.Series, families: Sequence[str]) -> Over:
@@ -153,9 +153,9 @@ def _speeds(
     if not rounds:
         return None
     if len(set(families)) >= FEWEST_FAMILIES:
-        logs = [median(map(log, found)) for found in ratios]
+        logs = [median(map(log, ratio)) for ratio in ratios]
         return compare_ratios([exp(one) for one in family_means(logs, families)])
-    together = np.log([found[:rounds] for found in ratios]).mean(axis=0)
+    together = np.log([ratio[:rounds] for ratio in ratios]).mean(axis=0)
     return compare_ratios(np.exp(together).tolist())
 
 
@@ -180,11 +180,11 @@ def findings(
     if claims:
         stated = [(claim_of_the_paper(evidence),)] if evidence.paper.stated else []
         sentences = [*stated, verdicts_counted(claims)]
-    told = field_words(field) if field else ["No map to the disk to compare."]
+    field_sentences = field_words(field) if field else ["No map to the disk to compare."]
     if claims and field:
-        told[0] = _beside_the_paper(evidence, field, told[0])
-    told += [stability_words(evidence.records), scatter_words(evidence.records)]
-    sentences += [(words,) for words in told if words]
+        field_sentences[0] = _beside_the_paper(evidence, field, field_sentences[0])
+    field_sentences += [stability_words(evidence.records), scatter_words(evidence.records)]
+    sentences += [(words,) for words in field_sentences if words]
     best = field["best"] if field else evidence.reference
     return Findings(
         tuple(sentences),
@@ -236,9 +236,9 @@ def _picture(
     reference = evidence.series_of(evidence.reference)
     for wanted in (label, reference.label if reference else label):
         for surface in sorted(evidence.surfaces, key=lambda s: -s.faces):
-            found = inspections.get(surface.mesh_hash)
-            if found and wanted in found.checkerboards:
-                return found.checkerboards[wanted]
+            inspection = inspections.get(surface.mesh_hash)
+            if inspection and wanted in inspection.checkerboards:
+                return inspection.checkerboards[wanted]
     return None
 
 
@@ -289,26 +289,26 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     paper = evidence.paper
     names = ", ".join(algorithm.upper() for algorithm in paper.compared)
     printed = ", ".join(f"{paper.stated['rate'][algorithm]:.1f}" for algorithm in paper.compared)
-    told = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
-    here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in told)
+    by_policy = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
+    rates_here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in by_policy)
     origins = Counter(surface.origin for surface in evidence.one_per_model)
     models, others = origins["model"], origins["stand-in"]
     over = [f"{models} of its models"] if models else []
     over += [f"{others} stand-in{'s' if others > 1 else ''}"] if others else []
     intervals = (
         "with 95 % intervals over models"
-        if any(sure for _, (_, sure) in told)
+        if any(sure for _, (_, sure) in by_policy)
         else f"too few for an interval ({DEFAULT_ROUNDS} rounds on {FEWEST_FAMILIES} models)"
     )
     return (
-        f"{paper.reference.upper()} against {names}: printed {printed}; here {here}. This is "
+        f"{paper.reference.upper()} against {names}: printed {printed}; here {rates_here}. This is "
         f"{paper.rate}, averaged over the models; here over {' and '.join(over)}, {intervals}."
     )
 
 
 def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     """Return the measured averages as text, and whether one of them has an interval."""
-    told, sure = [], False
+    phrases, sure = [], False
     for algorithm in evidence.paper.compared:
         rates = list(measured_rates(evidence, algorithm, policy).values())
         rows = measured(evidence, algorithm, policy)
@@ -316,19 +316,19 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
         rounds = [paired_ratios(record, base) for record, base in both if base is not None]
         interval = rate_interval(list(filter(None, rounds)), log=False)
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
-        told.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
+        phrases.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
         sure = sure or interval is not None
-    return ", ".join(told), sure
+    return ", ".join(phrases), sure
 
 
 def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
     """Return the numbers of all verdicts, failing ones first and with links to their claims."""
     parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
     for verdict, (one, several) in VERDICTS.items():
-        found = [claim for claim in claims if claim.verdict == verdict]
-        if found:
-            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(found)} ")
-            parts.append(one if len(found) == 1 else several)
-        for k, claim in enumerate(found if verdict in _NAMED else ()):
+        claims_of = [claim for claim in claims if claim.verdict == verdict]
+        if claims_of:
+            parts.append(f"{'; ' if len(parts) > 1 else ''}{len(claims_of)} ")
+            parts.append(one if len(claims_of) == 1 else several)
+        for k, claim in enumerate(claims_of if verdict in _NAMED else ()):
             parts += [", " if k else ": ", claim]
     return (*parts, ".")

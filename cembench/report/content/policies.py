@@ -34,13 +34,13 @@ def work_tables(evidence: Evidence) -> list[Table]:
         own = [record for record in evidence.records if record.cell.solves == policy]
         if any(map(counted, own)):
             known = {"policy": policy, **evidence.paper.functions()}
-            told = (filled(note, evidence.frame, known) for note in evidence.paper.work_notes)
+            notes = (filled(note, evidence.frame, known) for note in evidence.paper.work_notes)
             made = declared_table(
                 evidence,
                 "linear-algebra-work",
                 policy=policy,
                 surfaces=evidence.surfaces,
-                notes=list(filter(None, told)),
+                notes=list(filter(None, notes)),
                 called=f"linear-algebra-work-{policy}",
             )
             tables += [made] if made else []

@@ -68,11 +68,11 @@ def _printed_table(evidence: Evidence, number: int, policy: str | None) -> list[
     if evidence.models and table.figures:
         own = [q for a in shown for q in _quantities(evidence, number, evidence.series_of(a), a)]
         absent = ", ".join(absent_models(evidence))
-        here = f" Here {POLICIES.get(policy, policy)}." if policy else ""
+        measured_as = f" Here {POLICIES.get(policy, policy)}." if policy else ""
         tables.append(
             table_beside(
                 evidence, name, f"Table {number}: {table.title}{add}", evidence.models, own,
-                policy=policy, caption=table.caption + here, footers=footers,
+                policy=policy, caption=table.caption + measured_as, footers=footers,
                 notes=(*table.notes, *(f"printed at {place}" for place in table.sources)),
                 absent=f"not in this run: {absent}" if absent else "",
             )
@@ -130,8 +130,12 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
     rows, counts, work = [], [words("n, models counted")], []
     sets = {}
     for a in paper.compared:
-        here = measured_rates(evidence, a, policy)
-        sets[a] = (printed_rates(paper, a), printed_rates(paper, a, list(here)), [*here.values()])
+        measured = measured_rates(evidence, a, policy)
+        sets[a] = (
+            printed_rates(paper, a),
+            printed_rates(paper, a, list(measured)),
+            [*measured.values()],
+        )
         counts += [words(""), *(count(len(rates)) for rates in sets[a])]
         work.append(work_ratios(evidence, a, policy))
     for k, reading in enumerate(READINGS):

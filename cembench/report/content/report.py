@@ -196,7 +196,7 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
     dates = sorted(record.started_at[:10] for record in evidence.records)
     rounds = sorted({len(r.outcome.rounds) for r in evidence.records if r.outcome.rounds})
     origins = Counter(surface.origin for surface in evidence.surfaces)
-    found = [
+    rows = [
         ("run", str(evidence.store.folder)),
         ("measured", " to ".join(dict.fromkeys((dates[0], dates[-1])))),
         ("cells", ", ".join(f"{count} {status}" for status, count in statuses.most_common())),
@@ -210,13 +210,13 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
     ]
     if evidence.superseded:
         older = len(evidence.superseded)
-        found.append(("left out", f"{older} older records of cells measured again"))
+        rows.append(("left out", f"{older} older records of cells measured again"))
     used = {record.environment for record in evidence.records}
     for key, machine in evidence.store.environments().items():
         if key in used:
-            found.append(("machine", _machine(machine)))
-    found.append(("report by", f"cembench {installed_version()}"))
-    return found
+            rows.append(("machine", _machine(machine)))
+    rows.append(("report by", f"cembench {installed_version()}"))
+    return rows
 
 
 def _machine(about: Mapping[str, object]) -> str:
@@ -268,8 +268,8 @@ def _paper_summary(run: _Run) -> Section:
             f"{marks}. A dagger marks a misprint, an exclamation mark an unstable time."
         )
     ]
-    if said := stand_ins_words(evidence):
-        items.append(Text(said))
+    if sentence := stand_ins_words(evidence):
+        items.append(Text(sentence))
     items.append(not_ok(evidence))
     return Section("summary", "What this is", tuple(items))
 

@@ -309,8 +309,8 @@ def _sortable(number: float | None) -> str:
 
 
 def _common_origin(values: Sequence[Value]) -> Any:
-    found = {value.origin for value in values if value.number is not None}
-    return found.pop() if len(found) == 1 else ""
+    origins = {value.origin for value in values if value.number is not None}
+    return origins.pop() if len(origins) == 1 else ""
 
 
 def _letters(place: int) -> str:
@@ -356,11 +356,11 @@ class _Pictures:
         file = self._files[id(figure)]
         if file is None:
             return None
-        found = self._found[file]
-        uri = "" if copy or file in self._placed else found.uri
+        source = self._found[file]
+        uri = "" if copy or file in self._placed else source.uri
         if uri:
             self._placed.add(file)
-        return {"file": str(file), "uri": uri, "width": found.width, "height": found.height}
+        return {"file": str(file), "uri": uri, "width": source.width, "height": source.height}
 
     def first_of(self, section: Section) -> Mapping[str, Any] | None:
         """Return a copy of the first picture of a page, for the list of pages."""
@@ -372,8 +372,8 @@ class _Pictures:
 
 def _vector_file(figure: Figure) -> PurePosixPath | None:
     """Return the vector graphic of a plot, or of a figure that has no other picture."""
-    found = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
-    return found if figure.plot is not None or _pixel_file(figure) is None else None
+    vector = next((file for file in figure.files if file.suffix.lower() == ".svg"), None)
+    return vector if figure.plot is not None or _pixel_file(figure) is None else None
 
 
 def _pixel_file(figure: Figure) -> PurePosixPath | None:
@@ -393,15 +393,15 @@ def _small_files(
     folder: Path, needed: Iterable[PurePosixPath], others: Iterable[PurePosixPath]
 ) -> dict[str, str]:
     """Return the text of small data files by path; those of `others` need not exist."""
-    found = {}
+    small = {}
     for file in (*needed, *(file for file in others if (folder / file).exists())):
         try:
             content = (folder / file).read_bytes()
         except OSError as error:
             raise unreadable(folder / file, error) from error
         if len(content) <= DATA_BYTES:
-            found[str(file)] = content.decode(errors="replace")
-    return found
+            small[str(file)] = content.decode(errors="replace")
+    return small
 
 
 # --- records ---------------------------------------------------------------------------------
@@ -444,13 +444,13 @@ def _words(value: Any) -> str:
 
 def environment() -> jinja2.Environment:
     """Return the templates with the filters of pages."""
-    found = templates.environment()
-    found.filters |= {
+    forms = templates.environment()
+    forms.filters |= {
         "words": _prose,
         "stopped": lambda title: title if title.endswith((".", "?", "!")) else f"{title}.",
         "address": lambda file: quote(str(file)),
     }
-    return found
+    return forms
 
 
 def _prose(words: str) -> Markup:

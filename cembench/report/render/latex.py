@@ -59,10 +59,10 @@ def _forms() -> Any:
         for kind, pair in ends.items()
         for end, mark in zip(("start", "end"), pair, strict=True)
     }
-    found = environment(escape, **marks)
-    found.filters |= {"tex": lambda table: tex_of(table).with_suffix(""), "printable": _printable}
+    forms = environment(escape, **marks)
+    forms.filters |= {"tex": lambda table: tex_of(table).with_suffix(""), "printable": _printable}
     known = {"is_prose": is_prose, "portions": _portions, "groups_of": groups_of}
-    return found.get_template("latex.jinja", globals=known).module
+    return forms.get_template("latex.jinja", globals=known).module
 
 
 def escape(text: str) -> str:

@@ -43,9 +43,9 @@ def append_section(path: Path, section: Section) -> None:
 @cache
 def _forms() -> Any:
     """Return the parts of the template as functions."""
-    found = environment(lambda text: text.translate(_SPECIAL).replace("\n", " "))
-    found.filters["short"] = _short
-    return found.get_template("markdown.jinja", globals={"KEY": KEY}).module
+    forms = environment(lambda text: text.translate(_SPECIAL).replace("\n", " "))
+    forms.filters["short"] = _short
+    return forms.get_template("markdown.jinja", globals={"KEY": KEY}).module
 
 
 def _short(value: Any) -> str:

@@ -42,7 +42,7 @@ def environment(escape: Callable[[str], str] | None = None, **more: Any) -> jinj
     def escaped(value: Any) -> Any:
         return value if escape is None or isinstance(value, Markup) else Markup(escape(str(value)))
 
-    found = jinja2.Environment(
+    forms = jinja2.Environment(
         loader=jinja2.FileSystemLoader(FOLDER),
         autoescape=True,
         finalize=escaped,
@@ -52,13 +52,13 @@ def environment(escape: Callable[[str], str] | None = None, **more: Any) -> jinj
         **more,
     )
     kinds = (Claim, Figure, Gallery, Gap, Table, Text)
-    found.tests |= {kind.__name__.lower(): lambda it, k=kind: isinstance(it, k) for kind in kinds}
-    found.filters |= {"heading": heading, "csv": csv_of}
-    found.globals |= {
+    forms.tests |= {kind.__name__.lower(): lambda it, k=kind: isinstance(it, k) for kind in kinds}
+    forms.filters |= {"heading": heading, "csv": csv_of}
+    forms.globals |= {
         "ORIGINS": ORIGINS,
         "SIGNS": SIGNS,
         "SUSPECTS": SUSPECTS,
         "Counter": Counter,
         "marked": marked,
     }
-    return found
+    return forms

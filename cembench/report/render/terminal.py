@@ -245,14 +245,14 @@ def _head(report: Report) -> Iterator[RenderableType]:
     yield Line(report.title, "bold")
     if report.paper is not None:
         yield Line(f"{report.paper.authors}. {report.paper.place}. doi:{report.paper.doi}")
-    found = report.findings
-    if found is not None:
-        yield from (Line(f"\n{plain(sentence)}") for sentence in found.sentences)
+    findings = report.findings
+    if findings is not None:
+        yield from (Line(f"\n{plain(sentence)}") for sentence in findings.sentences)
         yield Line()
-        yield from (Line(f"! {line}", STYLES["doubtful"]) for line in found.suspects)
-        if found.table is not None:
-            yield from (folded(replace(found.table, caption="", notes=())), Line())
-        for figure in found.figures:
+        yield from (Line(f"! {line}", STYLES["doubtful"]) for line in findings.suspects)
+        if findings.table is not None:
+            yield from (folded(replace(findings.table, caption="", notes=())), Line())
+        for figure in findings.figures:
             line = Line.assemble((figure.number, "bold"), f"  {figure.words}")
             yield Padding(line, (0, 0, 0, 2), expand=False)
     yield Line()
