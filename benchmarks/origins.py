@@ -13,7 +13,6 @@ import io
 import json
 import subprocess
 import tarfile
-import tokenize
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from functools import cache
@@ -41,6 +40,8 @@ MEASURING = "cembench/api/benchmark.py"
 #: Of whose imports everything is meant that entry points name, or all that the package offers.
 _ALL = ("cembench/registry.py", "cembench/__init__.py")
 
+#: Fields of a syntax tree that change nothing: how a name is used, and how a text is written.
+_NO_MEANING = ("ctx", "kind", "type_comment")
 #: What writes pages, and makes no figure.
 _WRITING = ("benchmarks/pages.py", "benchmarks/origins.py")
 
@@ -86,24 +87,48 @@ def hashes(tree: Tree, start: str) -> dict[str, str]:
 
 @cache
 def plain(source: str) -> str:
-    """Return source code without comments, docstrings and blank lines.
+    """Return what source code does: without comments, docstrings, layout and names of locals.
 
-    >>> print(plain("x = 1  # one" + chr(10) * 3 + "y = 2"))
-    x = 1
-    y = 2
+    >>> plain("def f(a): b = a; return b") == plain("def f(a): c = a; return c")
+    True
     """
-    lines = source.splitlines()
-    for token in tokenize.generate_tokens(io.StringIO(source).readline):
-        if token.type == tokenize.COMMENT:
-            row, column = token.start
-            lines[row - 1] = lines[row - 1][:column]
-    for node in ast.walk(ast.parse(source)):
+    tree = ast.parse(source)
+    for node in ast.walk(tree):
         body = getattr(node, "body", None)
         first = body[0] if isinstance(body, list) and body else None
         if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
-            for row in range(first.lineno - 1, first.end_lineno or first.lineno):
-                lines[row] = ""
-    return "\n".join(line.rstrip() for line in lines if line.strip())
+            del body[0]
+    return repr(_canonical(tree, {}))
+
+
+def _canonical(node: Any, names: Mapping[str, str]) -> Any:
+    """Return a syntax tree as tuples, the locals of its functions by numbers.
+
+    Fields that are empty are left out: newer versions of Python add some.
+    """
+    if isinstance(node, list):
+        return [_canonical(one, names) for one in node]
+    if not isinstance(node, ast.AST):
+        return node
+    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+        names = {**names, **_locals(node, len(names))}
+    if isinstance(node, ast.Name):
+        return ("Name", names.get(node.id, node.id))
+    fields = ((name, value) for name, value in ast.iter_fields(node) if name not in _NO_MEANING)
+    held = [(name, _canonical(v, names)) for name, v in fields if v is not None and v != []]
+    return (type(node).__name__, held)
+
+
+def _locals(function: ast.FunctionDef | ast.AsyncFunctionDef, known: int) -> dict[str, str]:
+    """Return numbers for the names that a function stores; parameters stay what they are called."""
+    arguments = {node.arg for node in ast.walk(function) if isinstance(node, ast.arg)}
+    outer = (ast.Global, ast.Nonlocal)
+    shared = {name for node in ast.walk(function) if isinstance(node, outer) for name in node.names}
+    nodes = (node for node in ast.walk(function) if isinstance(node, ast.Name))
+    stored = [node for node in nodes if isinstance(node.ctx, ast.Store)]
+    stored.sort(key=lambda node: (node.lineno, node.col_offset))
+    own = dict.fromkeys(node.id for node in stored if node.id not in arguments | shared)
+    return {name: f"local {known + k}" for k, name in enumerate(own)}
 
 
 def _closure(tree: Tree, start: str) -> set[str]:

@@ -50,8 +50,22 @@ def test_what_reads_records_does_not_depend_on_algorithms():
     assert changed(started, TREE | {"cembench/results/records.py": "x = 1\n"}) == ["harness"]
 
 
-def test_comments_within_texts_and_code_stay():
-    assert plain('x = "# no comment"  # a comment\n\n\ny = 2\n') == 'x = "# no comment"\ny = 2'
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        ('x = "# no comment"  # one\n\n\ny = 2\n', "x = '# no comment'\ny = (2)", True),
+        ('x = "# no comment"', 'x = "# another"', False),
+        ('"""Two."""\ndef f(): return 1', 'def f():\n    """One."""\n    return 1', True),
+        ("def f(a):\n    b = a\n    return b", "def f(a):\n    c = a\n    return c", True),
+        ("def f(a):\n    return a", "def f(b):\n    return b", False),  # callers name it
+        ("def f(a):\n    b = c\n    return b", "def f(a):\n    c = c\n    return c", False),
+        ("x = 1", "y = 1", False),
+        ("def f():\n    a = b = 1\n    return a", "def f():\n    a = b = 1\n    return b", False),
+        ("def f():\n    global a\n    a = 1", "def f():\n    global b\n    b = 1", False),
+    ],
+)
+def test_what_code_does_is_compared_and_not_how_it_is_written(one, other, same):
+    assert (plain(one) == plain(other)) == same
 
 
 def test_a_new_algorithm_counts_and_what_has_no_hashes_is_unknown():

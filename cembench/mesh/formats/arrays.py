@@ -24,7 +24,7 @@ _COUNTED_FROM = (1, 0)
 
 
 def soup_of_arrays(
-    arrays: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
+    found: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
 ) -> Soup:
     """Build a surface from the requested arrays, else from usual names, else from two that fit.
 
@@ -34,7 +34,7 @@ def soup_of_arrays(
 
     Parameters
     ----------
-    arrays : mapping of str to array
+    found : mapping of str to array
         The two-dimensional arrays of numbers.
     asked : tuple of two str, optional
         The names of vertices and triangles.
@@ -47,16 +47,16 @@ def soup_of_arrays(
         No pair fits, or several do; the message lists the arrays.
 
     """
-    pair = asked or next((pair for pair in USUAL if set(pair) <= set(arrays)), None)
+    pair = asked or next((pair for pair in USUAL if set(pair) <= set(found)), None)
     notices: tuple[Notice, ...] = ()
     if pair is None:
-        pairs = [(v, f) for v in arrays for f in arrays if v != f and _fits(arrays[v], arrays[f])]
-        pairs = [pair for pair in pairs if arrays[pair[0]].shape[1] == 3] or pairs
+        pairs = [(v, f) for v in found for f in found if v != f and _fits(found[v], found[f])]
+        pairs = [pair for pair in pairs if found[pair[0]].shape[1] == 3] or pairs
         if len(pairs) != 1:
             fitting = "; ".join(f"{v} and {f}" for v, f in pairs)
             why = f"several pairs fit: {fitting}" if pairs else "no two of them fit"
             raise MeshError(
-                f"no variables 'v' and 'f', and {why}. It has: {_listed(arrays)}. Needed are the "
+                f"no variables 'v' and 'f', and {why}. It has: {_listed(found)}. Needed are the "
                 'vertices (n, 3) and the triangles (m, 3); name them, as in arrays=("v2", "f2") of '
                 "cembench.read_mesh."
             )
@@ -64,9 +64,9 @@ def soup_of_arrays(
         text = f"the arrays {pair[0]!r} and {pair[1]!r} were used as vertices and triangles"
         notices = (Notice(NoticeKind.ARRAYS_GUESSED, text),)
     for name in pair:
-        if name not in arrays:
-            raise MeshError(f"there is no variable {name!r}; it has: {_listed(arrays)}.")
-    v, f = arrays[pair[0]], arrays[pair[1]]
+        if name not in found:
+            raise MeshError(f"there is no variable {name!r}; it has: {_listed(found)}.")
+    v, f = found[pair[0]], found[pair[1]]
     if v.shape[1] not in (2, 3) or f.shape[1] != 3:
         raise MeshError(
             f"{pair[0]!r} must be of shape (n, 3) and {pair[1]!r} of shape (m, 3); they are "
@@ -124,6 +124,6 @@ def _whole(f: NDArray[Any]) -> bool:
     return bool((np.abs(f.astype(np.float64)) < 2**53).all() and (np.round(f) == f).all())
 
 
-def _listed(arrays: Mapping[str, NDArray[Any]]) -> str:
+def _listed(found: Mapping[str, NDArray[Any]]) -> str:
     """Return the names and shapes of arrays for a message."""
-    return ", ".join(f"{name} {array.shape}" for name, array in arrays.items()) or "none"
+    return ", ".join(f"{name} {array.shape}" for name, array in found.items()) or "none"
