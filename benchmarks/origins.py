@@ -42,6 +42,7 @@ _ALL = ("cembench/registry.py", "cembench/__init__.py")
 
 #: Fields of a syntax tree that change nothing: how a name is used, and how a text is written.
 _NO_MEANING = ("ctx", "kind", "type_comment")
+_IMPORTS = (ast.Import, ast.ImportFrom)
 #: What writes pages, and makes no figure.
 _WRITING = ("benchmarks/pages.py", "benchmarks/origins.py")
 
@@ -89,6 +90,8 @@ def hashes(tree: Tree, start: str) -> dict[str, str]:
 def plain(source: str) -> str:
     """Return what source code does: without comments, docstrings, layout and names of locals.
 
+    Where in a file something is imported does not count either.
+
     >>> plain("def f(a): b = a; return b") == plain("def f(a): c = a; return c")
     True
     """
@@ -98,7 +101,8 @@ def plain(source: str) -> str:
         first = body[0] if isinstance(body, list) and body else None
         if isinstance(first, ast.Expr) and isinstance(first.value, ast.Constant):
             del body[0]
-    return repr(_canonical(tree, {}))
+    imports = (node for node in ast.walk(tree) if isinstance(node, _IMPORTS))
+    return repr([sorted(map(ast.unparse, imports)), _canonical(tree, {})])
 
 
 def _canonical(node: Any, names: Mapping[str, str]) -> Any:
@@ -107,7 +111,7 @@ def _canonical(node: Any, names: Mapping[str, str]) -> Any:
     Fields that are empty are left out: newer versions of Python add some.
     """
     if isinstance(node, list):
-        return [_canonical(one, names) for one in node]
+        return [_canonical(one, names) for one in node if not isinstance(one, _IMPORTS)]
     if not isinstance(node, ast.AST):
         return node
     if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):

@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_100,
     "mesh": 5_950,
     "linear_algebra": 1_500,
-    "conformal": 6_250,
+    "conformal": 6_350,
     "registry": 950,
     "results": 4_700,
     "running": 7_300,

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize
 
 from cembench.conformal.metrics import SampledAngleError, angle_errors, flipped_triangles
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -53,6 +52,8 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
     True
 
     """
+    from scipy.optimize import minimize  # a tenth of a second
+
     sampled = SampledAngleError(mesh)
     own = sampled(uv)
     found = minimize(

@@ -12,7 +12,6 @@ from cembench.conformal.planar import turns
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm, load_registry
-from cembench.running.measure import refinement_of
 
 
 @algorithm(
@@ -36,6 +35,8 @@ def cetm_flips_overlay(
     surface's own vertices are the map of the cell, made valid as for cetm-flips. Its seconds are
     those of both. `parameterize(surface, "cetm-flips", overlay=True)` returns the refinement.
     """
+    from cembench.running.measure import refinement_of  # what measures, loaded where it is used
+
     refined_map = refinement_of(load_registry().algorithm("cetm-flips"))
     refined = refined_map(mesh, tolerance=tolerance, max_iterations=max_iterations)
     fine, image, found = refined.mesh, refined.uv, refined.extras

@@ -61,6 +61,8 @@ def test_what_reads_records_does_not_depend_on_algorithms():
         ("def f(a):\n    b = c\n    return b", "def f(a):\n    c = c\n    return c", False),
         ("x = 1", "y = 1", False),
         ("def f():\n    a = b = 1\n    return a", "def f():\n    a = b = 1\n    return b", False),
+        ("import a\ndef f():\n    return a", "def f():\n    import a\n    return a", True),
+        ("from a import b", "from c import b", False),
         ("def f():\n    global a\n    a = 1", "def f():\n    global b\n    b = 1", False),
     ],
 )
