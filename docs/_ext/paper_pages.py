@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import cembench
@@ -18,4 +19,6 @@ def write_pages(folder: Path) -> None:
         youngest = max(file.stat().st_mtime for file in run.rglob("*.json"))
         if not page.is_file() or page.stat().st_mtime < youngest:
             own = sorted((ROOT / "papers" / run.name).glob("success.toml"))
-            cembench.Run(run).report(page.parent, paper=run.name, tables=own)
+            # Relative paths: a page says which run it shows, and not on which machine.
+            shown, *tables = (Path(os.path.relpath(path)) for path in (run, *own))
+            cembench.Run(shown).report(page.parent, paper=run.name, tables=tables)

@@ -39,18 +39,18 @@ def cetm_flips_overlay(
 
     refined_map = refinement_of(load_registry().algorithm("cetm-flips"))
     refined = refined_map(mesh, tolerance=tolerance, max_iterations=max_iterations)
-    fine, image, found = refined.mesh, refined.uv, refined.extras
-    uv, told = valid_map(mesh, image[: mesh.n])
+    fine, image, numbers = refined.mesh, refined.uv, refined.extras
+    uv, repairs = valid_map(mesh, image[: mesh.n])
     folds = flipped_triangles(fine, image)
     once = turns(image[fine.boundary])[0] == 1
     return Parameterization(
         uv,
         extras={
-            **told,
-            "curvature": found["curvature"],
-            "flips": found["flips"],
+            **repairs,
+            "curvature": numbers["curvature"],
+            "flips": numbers["flips"],
             "overlay_valid": float(not folds and is_disk_map(fine, image) and once),
-            "overlay_folded": found["folded_before_repair"],
+            "overlay_folded": numbers["folded_before_repair"],
             "overlay_triangles": fine.m,
             "overlay_angle_mean": float(angle_errors(fine, image).mean()),
         },
