@@ -72,8 +72,8 @@ def circle_packing(
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, mesh.boundary))
     uv[mesh.boundary] /= np.abs(uv[mesh.boundary])
     uv, folds = accepted_repair(mesh, uv, laplacian(mesh), repair=repair)
-    told = {"angle_sum": history[-1], "ignores": "geometry"}
-    return Parameterization(uv, len(history), extras={**told, **folds})
+    extras = {"angle_sum": history[-1], "ignores": "geometry"}
+    return Parameterization(uv, len(history), extras={**extras, **folds})
 
 
 def _touching(mesh: DiskMesh, z: Complex, radii: Real) -> Complex:
@@ -143,8 +143,8 @@ class _Packing:
         F = self.mesh.F
         with phase("angles"):
             R = np.exp(log_radii - log_radii.max())[F]
-            found, _ = angles(R.sum(axis=1, keepdims=True) - R)
-            off = angle_sums(F, found, self.mesh.n)[self.inside] - 2 * np.pi
+            sums, _ = angles(R.sum(axis=1, keepdims=True) - R)
+            off = angle_sums(F, sums, self.mesh.n)[self.inside] - 2 * np.pi
             return float(np.abs(off).max())
 
 
@@ -193,12 +193,12 @@ def _packed(packing: _Packing, tolerance: float, most: int) -> tuple[Complex, li
 
 def _extrapolated(points: list[Real], steps: list[Real]) -> Real:
     """Return the extrapolated limit of steps (Anderson mixing); at first the last point."""
-    here = points[-1]
+    last = points[-1]
     if len(points) < 2:
-        return here
+        return last
     change = np.stack([steps[-1] - step for step in steps[:-1]], axis=1)
-    along = np.stack([here - point for point in points[:-1]], axis=1)
+    along = np.stack([last - point for point in points[:-1]], axis=1)
     share = np.linalg.lstsq(change, steps[-1], rcond=1e-8)[0]
     jump = along @ share
     longest = float(np.abs(jump).max())
-    return np.asarray(here - jump * min(1.0, FARTHEST / longest) if longest > 0 else here)
+    return np.asarray(last - jump * min(1.0, FARTHEST / longest) if longest > 0 else last)

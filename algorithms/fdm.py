@@ -111,8 +111,8 @@ def fdm(
             break
     z, folds = accepted_repair(mesh, best, L, repair=repair)
     kept = history[: len(history) - dropped]
-    told = {**folds, "iterations_dropped": dropped}
-    return Parameterization(z, len(kept) - 1, tuple(kept), told)
+    extras = {**folds, "iterations_dropped": dropped}
+    return Parameterization(z, len(kept) - 1, tuple(kept), extras)
 
 
 def _coefficients(mesh: DiskMesh, z: Complex) -> Complex:

@@ -96,6 +96,6 @@ def gu_yau(
                 break
     z = harmonic_extension(L, mesh.boundary, boundary_on_circle(mesh, S))
     z, folds = accepted_repair(mesh, z, L, repair=repair)
-    told = {"stopped": stopped, "energy_of": "half of the sphere's, less 2 pi"}
+    extras = {"stopped": stopped, "energy_of": "half of the sphere's, less 2 pi"}
     history = tuple(energy / 2 - 2 * np.pi for energy in energies)
-    return Parameterization(z, len(history) - 1, history, {**told, **folds})
+    return Parameterization(z, len(history) - 1, history, {**extras, **folds})

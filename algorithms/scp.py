@@ -82,11 +82,11 @@ def scp(
         with phase("assembly"):
             H, solve = _dense_form(bordered.S, W)
     with phase("eigenvectors"):
-        found, value, residual, iterations = _least(H, solve, W, tolerance, max_iterations)
-    uv = found if len(found) == mesh.n else bordered.harmonic_extension(found)
+        vector, value, residual, iterations = _least(H, solve, W, tolerance, max_iterations)
+    uv = vector if len(vector) == mesh.n else bordered.harmonic_extension(vector)
     uv, folds = with_area_pi(mesh, uv, repair=repair)
-    told = {"eigenvalue": value, "residual": residual, "sweeps": iterations}
-    return Parameterization(uv, extras={**told, **folds})
+    extras = {"eigenvalue": value, "residual": residual, "sweeps": iterations}
+    return Parameterization(uv, extras={**extras, **folds})
 
 
 def _weights(mesh: DiskMesh, weights: Weights, at: NDArray[np.int64]) -> Real:

@@ -100,8 +100,8 @@ def main(arguments: Sequence[str]) -> None:
     for section in sections if write_docs else ():
         section.write(name)
         if section.page and section.page != STATES:
-            given = shlex.join(["python", "-m", "benchmarks", *map(without_folder, arguments)])
-            record(f"{section.page} {name}", f"benchmarks/{name}.py", given, seconds)
+            command = shlex.join(["python", "-m", "benchmarks", *map(without_folder, arguments)])
+            record(f"{section.page} {name}", f"benchmarks/{name}.py", command, seconds)
 
 
 def without_folder(word: str) -> str:

@@ -63,8 +63,8 @@ def _disk(path: str, largest: int) -> cembench.DiskMesh | None:
 
 def _map(mesh: cembench.DiskMesh, name: str) -> tuple[float | None, float | None]:
     try:
-        given = {"even": 5} if name == EVEN else {}
-        result = cembench.parameterize(mesh, name.partition(",")[0], check="fast", **given)
+        parameters = {"even": 5} if name == EVEN else {}
+        result = cembench.parameterize(mesh, name.partition(",")[0], check="fast", **parameters)
     except cembench.AlgorithmFailed:
         return None, None
     return float(result.metrics["angle_error_mean_deg"] or 0.0), result.seconds

@@ -43,18 +43,18 @@ def expressions(files: Sequence[Path], *, algorithm: str = "direct-cem") -> Sect
     first, *others = [read_scan(file) for file in progress(files)]
     rows, reasons = [], list[str]()
     for step in (1, 2, 4, len(first[1])):
-        told = told_of(len(first[1]), step)
+        landmarks = told_of(len(first[1]), step)
         errors: list[float] = []
         worst = 0.0
         for other in others:
             try:
-                found = errors_of(first, other, told, algorithm)
+                between = errors_of(first, other, landmarks, algorithm)
             except (AlgorithmFailed, ParameterError) as error:
-                reasons.append(f"{other[0].name}, {len(told)} landmarks: {error}")
+                reasons.append(f"{other[0].name}, {len(landmarks)} landmarks: {error}")
                 continue
-            errors.append(float(np.median(found)))
-            worst = max(worst, float(found.max()))
-        rows.append(row(told, errors, worst, len(others) - len(errors)))
+            errors.append(float(np.median(between)))
+            worst = max(worst, float(between.max()))
+        rows.append(row(landmarks, errors, worst, len(others) - len(errors)))
     about = (
         f"{len(others)} scans beside the first; errors in percent of the distance between the "
         "outer corners of the eyes: medians of a scan's landmarks, then the median over scans."
@@ -88,24 +88,26 @@ def told_of(count: int, step: int) -> list[int]:
 def errors_of(
     first: tuple[DiskMesh, Landmarks],
     other: tuple[DiskMesh, Landmarks],
-    told: Sequence[int],
+    landmarks: Sequence[int],
     algorithm: str,
 ) -> NDArray[np.float64]:
     """Return the errors in percent at the landmarks that were not told, or at all if all were."""
-    given = {str(k): [int(first[1][k]), int(other[1][k])] for k in told}
-    path = morph([first[0], other[0]], given, algorithm=algorithm, pose="keep")
-    left = [k for k in range(len(first[1])) if k not in told] or list(told)
+    pairs = {str(k): [int(first[1][k]), int(other[1][k])] for k in landmarks}
+    path = morph([first[0], other[0]], pairs, algorithm=algorithm, pose="keep")
+    left = [k for k in range(len(first[1])) if k not in landmarks] or list(landmarks)
     marked = other[0].V[other[1]]
     unit = np.linalg.norm(np.subtract(*marked[list(EYES)]))
     away = np.linalg.norm(path.at(1.0)[first[1][left]] - marked[left], axis=1)
     return np.asarray(100 * away / unit)
 
 
-def row(told: Sequence[int], errors: Sequence[float], worst: float, fails: int) -> dict[str, Any]:
+def row(
+    landmarks: Sequence[int], errors: Sequence[float], worst: float, fails: int
+) -> dict[str, Any]:
     """Return the table's row for one number of landmarks."""
     around = median_interval(errors)
     return {
-        "told": len(told),
+        "told": len(landmarks),
         "scans": len(errors),
         "median": float(np.median(errors)) if errors else None,
         "interval": f"{around.low:.2f} to {around.high:.2f}" if around else "too few scans",

@@ -49,7 +49,7 @@ def family_intervals(*, runs: int = 2000) -> Section:
             held = np.zeros(len(METHODS))
             for _ in range(runs):
                 figures, families = drawn(sizes, draw, rng)
-                held += [truth in found for found in intervals(figures, families, rng)]
+                held += [truth in interval for interval in intervals(figures, families, rng)]
             row |= dict(zip((f"{name}/{m}" for m in METHODS), held / runs, strict=True))
         rows.append(row)
     rows.append(false_wins(runs))
@@ -108,10 +108,10 @@ def average_intervals(
     """Return the three intervals of a geometric mean."""
     own = np.array(family_means(np.log(figures).tolist(), families))
     around = bootstrap(own, rng)
-    naive, here = average_interval(figures.tolist()), average_interval(figures.tolist(), families)
+    naive, apart = average_interval(figures.tolist()), average_interval(figures.tolist(), families)
     assert naive
-    assert here
-    return naive, Interval(float(np.exp(around.low)), float(np.exp(around.high))), here
+    assert apart
+    return naive, Interval(float(np.exp(around.low)), float(np.exp(around.high))), apart
 
 
 def bootstrap(own: Array, rng: np.random.Generator) -> Interval:
@@ -144,6 +144,6 @@ def false_wins(runs: int) -> dict[str, Any]:
             wrong += [
                 sign_test(*votes(figures.tolist(), one, of)) <= ERROR for of in (singles, families)
             ]
-        naive, here = wrong / runs
-        row |= dict(zip((f"{name}/{m}" for m in METHODS), (naive, None, here), strict=True))
+        naive, apart = wrong / runs
+        row |= dict(zip((f"{name}/{m}" for m in METHODS), (naive, None, apart), strict=True))
     return row

@@ -44,13 +44,13 @@ def holed_surfaces(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
     surfaces = dict(holed_below(folders, faces))
     if not surfaces:
         raise SystemExit(f"no surface with holes is below {', '.join(map(str, folders))}.")
-    found = {
+    outcomes = {
         name: {one: outcome(mesh, one) for one in NAMES}
         for name, mesh in progress(list(surfaces.items()))
     }
     bests = {
         name: min((one["angle"] for one in row.values() if one["valid"]), default=None)
-        for name, row in found.items()
+        for name, row in outcomes.items()
     }
     rows = [
         {
@@ -59,27 +59,27 @@ def holed_surfaces(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
             "holes": len(surfaces[name].loops) - 1,
             "told": {one: row[one]["told"] for one in NAMES},
         }
-        for name, row in found.items()
+        for name, row in outcomes.items()
     ]
     summary = [
-        standing(one, [(row[one], bests[name]) for name, row in found.items()]) for one in NAMES
+        standing(one, [(row[one], bests[name]) for name, row in outcomes.items()]) for one in NAMES
     ]
     without = sum(best is None for best in bests.values())
-    note = f"{without} of {len(found)} surfaces have no valid map by any."
+    note = f"{without} of {len(outcomes)} surfaces have no valid map by any."
     return Section([Table(summary, SUMMARY), Table(rows, SURFACES), note], "docs/holes.md")
 
 
 def holed_below(folders: Sequence[Path], faces: int) -> list[tuple[str, HoledMesh]]:
     """Return the surfaces with holes that have no more than so many triangles, by name."""
-    found = []
+    below = []
     for path in sorted(p for folder in folders for p in folder.rglob("*") if p.suffix in SUFFIXES):
         try:
             mesh = read_mesh(path, HoledMesh)
         except MeshError:  # another kind of surface
             continue
         if mesh.m <= faces:
-            found.append((path.stem, mesh))
-    return found
+            below.append((path.stem, mesh))
+    return below
 
 
 def outcome(mesh: HoledMesh, name: str) -> dict[str, Any]:
@@ -95,10 +95,10 @@ def outcome(mesh: HoledMesh, name: str) -> dict[str, Any]:
     angle = float(angle_errors(mesh, made.uv).mean())
     is_round = boundary_circularity(mesh, made.uv) < ROUND
     own = made.extras["folded_before_repair"]
-    told = f"{'' if is_round else '~ '}{angle:.2f}{f' ({own:,})' if own else ''}"
+    shown = f"{'' if is_round else '~ '}{angle:.2f}{f' ({own:,})' if own else ''}"
     return {
         "valid": not folds and not crosses,
-        "told": f"{folds:,} folds" if folds else "crosses" if crosses else told,
+        "told": f"{folds:,} folds" if folds else "crosses" if crosses else shown,
         "angle": angle,
         "round": is_round,
         "resort": "last_resort" in made.extras,
@@ -106,14 +106,14 @@ def outcome(mesh: HoledMesh, name: str) -> dict[str, Any]:
     }
 
 
-def standing(name: str, found: Sequence[tuple[dict[str, Any], float | None]]) -> dict[str, Any]:
+def standing(name: str, outcomes: Sequence[tuple[dict[str, Any], float | None]]) -> dict[str, Any]:
     """Return an algorithm's counts, and how its angles compare with the best on each surface."""
-    valid = [(one, best) for one, best in found if one["valid"]]
+    valid = [(one, best) for one, best in outcomes if one["valid"]]
     ratios = [one["angle"] / best for one, best in valid if best]
-    seconds = [one["seconds"] for one, _ in found]
+    seconds = [one["seconds"] for one, _ in outcomes]
     return {
         "name": name,
-        "surfaces": len(found),
+        "surfaces": len(outcomes),
         "valid": len(valid),
         "round": sum(one["round"] for one, _ in valid),
         "resort": sum(one["resort"] for one, _ in valid),

@@ -40,14 +40,14 @@ def nearest_real(sets: Sequence[str], *, made: bool = False) -> Section:
     makes them first.
     """
     registry = load_registry()
-    given = (one for name in sets for one in surfaces_of_set(name, registry))
-    found = gathered(
-        (one for one in given if one.mesh is None or not one.cut),
+    every = (one for name in sets for one in surfaces_of_set(name, registry))
+    candidates = gathered(
+        (one for one in every if one.mesh is None or not one.cut),
         registry,
         [registry.algorithm(MAPPED_BY)],
     )
     known = {d.mesh_hash: d.name for d in registry.datasets.values() if d.mesh_hash}
-    meshes = [mesh.renamed(known.get(mesh.hash, mesh.name)) for mesh in found.meshes]
+    meshes = [mesh.renamed(known.get(mesh.hash, mesh.name)) for mesh in candidates.meshes]
     real = {mesh.name: one for mesh in progress(meshes) if (one := facts(mesh, registry))}
     stand_ins = {row: facts(mesh, registry) for row, mesh in progress(list(kept(registry, made)))}
     own = {d.paper_row: d.name for d in registry.datasets.values() if d.paper_row}

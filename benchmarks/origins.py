@@ -61,12 +61,12 @@ def tree_at(commit: str) -> dict[str, str]:
     )
     if done.returncode:
         return {}
-    found = {}
+    files = {}
     with tarfile.open(fileobj=io.BytesIO(done.stdout)) as archive:
         for member in archive:
             if member.name.endswith(".py") and (file := archive.extractfile(member)):
-                found[member.name] = file.read().decode()
-    return found
+                files[member.name] = file.read().decode()
+    return files
 
 
 def hashes(tree: Tree, start: str) -> dict[str, str]:
@@ -137,18 +137,18 @@ def _locals(function: ast.FunctionDef | ast.AsyncFunctionDef, known: int) -> dic
 
 def _closure(tree: Tree, start: str) -> set[str]:
     """Return the files that a file imports, and those that these import."""
-    found, left = set(), [start]
+    reached, left = set(), [start]
     while left:
         file = left.pop()
-        if file in found:
+        if file in reached:
             continue
-        found.add(file)
+        reached.add(file)
         left += _imports(tree, file)
         if file in _ALL:
             left += [name for name in tree if name.startswith(tuple(ELSEWHERE.values()))]
         if file == "cembench/__init__.py":
             left += [name for name in tree if name.startswith("cembench/api/")]
-    return found
+    return reached
 
 
 def _imports(tree: Tree, file: str) -> Iterator[str]:

@@ -152,12 +152,12 @@ def measured(
     for model in progress(meshes):
         for column, title, call in runs:
             figures = cells(meshes[model], call(meshes[model].fresh(), model, repair))
-            said, here = printed(model, column), figures.shown()
-            names = zip(("E_C", "mean", "SD"), said, here, strict=True)
+            said, own = printed(model, column), figures.shown()
+            names = zip(("E_C", "mean", "SD"), said, own, strict=True)
             differ = [name for name, a, b in names if a != b]
             digits = f"not {', '.join(differ)}" if differ else "all agree"
             rows.append({"model": model, "column": column, "title": title, "said": said,
-                         "here": here, "folds": figures.folds, "digits": digits})  # fmt: skip
+                         "here": own, "folds": figures.folds, "digits": digits})  # fmt: skip
     return rows
 
 
@@ -181,7 +181,7 @@ def short(rows: Sequence[Mapping[str, Any]]) -> Table:
     by_model: dict[str, dict[str, str]] = {}
     for row in rows:
         pairs = zip(row["said"], row["here"], strict=True)
-        shown = ", ".join(here if here == said else f"{here} ({said})" for said, here in pairs)
+        shown = ", ".join(own if own == said else f"{own} ({said})" for said, own in pairs)
         by_model.setdefault(row["model"], {"model": row["model"]})[row["column"]] = shown
     return Table(list(by_model.values()), SHORT)
 

@@ -30,28 +30,28 @@ def iterates(mesh: DiskMesh) -> list[Cells]:
     with remembering() as tried:
         rules.qiem(mesh.fresh(), repair=False)
     L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
-    found = []
+    steps = []
     for S in accepted(L_double, tried):
         if S is not None:
             uv = harmonic_extension(L, mesh.boundary, rules.boundary_on_circle(mesh, S))
-            found.append(cells(mesh, Parameterization(uv)))
-    return found
+            steps.append(cells(mesh, Parameterization(uv)))
+    return steps
 
 
 def row(model: str, mesh: DiskMesh) -> dict[str, Any]:
     """Fit the number of steps to a printed row: the step that is nearest in E_C."""
-    said, found = printed(model, "qiem"), iterates(mesh)
-    step = int(np.argmin([abs(one.energy - float(said[0])) for one in found]))
-    here = found[step].shown()
-    met = [name for name, a, b in zip(NAMES, said, here, strict=True) if a == b]
+    said, steps = printed(model, "qiem"), iterates(mesh)
+    step = int(np.argmin([abs(one.energy - float(said[0])) for one in steps]))
+    shown = steps[step].shown()
+    met = [name for name, a, b in zip(NAMES, said, shown, strict=True) if a == b]
     return {
         "model": model,
         "printed": " ".join(said),
         "step": step + 1,
-        "here": " ".join(here),
+        "here": " ".join(shown),
         "met": ", ".join(met) or "none",
-        "last": len(found),
-        "converged": " ".join(found[-1].shown()),
+        "last": len(steps),
+        "converged": " ".join(steps[-1].shown()),
     }
 
 

@@ -87,11 +87,11 @@ def readme_speedups(*, report: Path | None = None) -> Section:
             "printed": [float(first[reading][f"{name} printed, all"]) for reading in AVERAGES],
             **{
                 policy: [
-                    f"{float(here[reading][f'{name} here']):.1f}"
+                    f"{float(averages[reading][f'{name} here']):.1f}"
                     + interval(folders[policy] / "records.csv", name.lower(), policy, reading)
                     for reading in AVERAGES
                 ]
-                for policy, here in by_policy.items()
+                for policy, averages in by_policy.items()
             },
         }
         for name in ("QIEM", "FDM", "LDM")

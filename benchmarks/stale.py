@@ -25,11 +25,11 @@ OF_RECORDS = ("readme_speedups",)
 def made_tables() -> list[str]:
     """Return the tables in pages that studies fill: the page and the study."""
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-    found = []
+    tables = []
     for page in pages:
         for study in re.findall(r"<!-- made by benchmarks/(\w+)\.py -->", page.read_text()):
-            found.append(f"{page.relative_to(ROOT).as_posix()} {study}")
-    return found
+            tables.append(f"{page.relative_to(ROOT).as_posix()} {study}")
+    return tables
 
 
 def kept_reports() -> list[str]:
@@ -89,7 +89,7 @@ def stale(*, check: bool = False, refresh: bool = False) -> Section:
             }
         )
     old = [row for row in rows if row["changed"] != "nothing"]
-    told = f"{len(old)} of {len(rows)} are older than the code that their figures depend on."
+    sentence = f"{len(old)} of {len(rows)} are older than the code that their figures depend on."
     if refresh:
         by_command = {row["command"]: row for row in old}
         lines = [f"{row['command']:70}  # {row['took']}" for row in by_command.values()]
@@ -103,5 +103,5 @@ def stale(*, check: bool = False, refresh: bool = False) -> Section:
                 f"{row['what']}: changed since {row['commit']}: {row['changed']}" for row in old
             )
         )
-        sys.exit(told)
-    return Section([told, Table(rows, LAYOUT)], page=PAGE)
+        sys.exit(sentence)
+    return Section([sentence, Table(rows, LAYOUT)], page=PAGE)

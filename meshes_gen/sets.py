@@ -30,8 +30,8 @@ def ict_faces_holes(registry: Registry, limit: int) -> Iterator[Provided]:
 def _faces(registry: Registry, part: str, limit: int) -> Iterator[Provided]:
     family = registry.surface(FACE)
     for seed in range(limit):
-        given = family.arguments({"seed": seed, "expression": "random", "part": part})
-        mesh: TriangleMesh = family.function(**given)
+        arguments = family.arguments({"seed": seed, "expression": "random", "part": part})
+        mesh: TriangleMesh = family.function(**arguments)
         name = f"{FACE}-{seed}" if part == "disk" else f"ict-{part}-{seed}"
         about = Provenance(source=FACE_SOURCE, family=FACE)
         yield Provided(name, f"{family.source}; seed {seed}", mesh, licence="MIT", provenance=about)

@@ -73,8 +73,8 @@ class Angles:
     def told(self, angles: Real) -> dict[str, float]:
         """Return the largest residual of each kind, as extras."""
         names = ("triangle_residual", "vertex_residual", "wheel_residual")
-        found = zip(names, self.residuals(angles), strict=True)
-        return {name: float(np.abs(r).max()) for name, r in found}
+        residuals = zip(names, self.residuals(angles), strict=True)
+        return {name: float(np.abs(r).max()) for name, r in residuals}
 
     def step(self, angles: Real, D: Real, gradient: Real) -> tuple[Real, Real]:
         """Return one Newton step on the constraints, linearised at `angles`.
@@ -169,10 +169,10 @@ def _pattern(
         rows[among_sums + wheel + degree[column]] = row + k
     pointers = np.concatenate([2 * start[:-1], 2 * (block + start)])
     A = scipy.sparse.csc_array((np.zeros(4 * block), rows, pointers), shape=(2 * k, 2 * k))
-    found = np.zeros(inside.shape, dtype=np.intp)
-    found[inside] = inverse
-    place = np.tile(among_sums[found].reshape(-1, 3, 3), (1, 2, 2))
-    place[:, 3:] += np.tile(degree[column][found].reshape(-1, 3, 3), (1, 1, 2))
+    places = np.zeros(inside.shape, dtype=np.intp)
+    places[inside] = inverse
+    place = np.tile(among_sums[places].reshape(-1, 3, 3), (1, 2, 2))
+    place[:, 3:] += np.tile(degree[column][places].reshape(-1, 3, 3), (1, 1, 2))
     place[:, :, 3:] += 2 * block
     inside = np.tile(inside.reshape(-1, 3, 3), (1, 2, 2)).ravel()
     return A, place.ravel()[inside], inside

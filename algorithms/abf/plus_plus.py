@@ -59,12 +59,12 @@ def abf_plus_plus(
         curvature = np.maximum(weight + bent, LEAST_CURVATURE * weight)
         e, y_w = problem.step(angles, 1 / curvature, weight * (angles - wanted))
         angles, share = kept_positive(angles, e)
-        told = problem.told(angles)
+        extras = problem.told(angles)
         moved = float(np.abs(share * e / angles).max())
-        if share == 1 and max(told.values()) <= tolerance and moved <= 1e-4:
-            return placed(mesh, angles, told, repair=repair, iterations=iteration)
+        if share == 1 and max(extras.values()) <= tolerance and moved <= 1e-4:
+            return placed(mesh, angles, extras, repair=repair, iterations=iteration)
     raise AlgorithmFailed(
         f"the angles have not converged after {max_iterations} Newton steps: the constraints are "
-        f"still off by up to {max(told.values()):.2g}, tolerance {tolerance:g}, and the last step "
-        f"changed an angle by a relative {moved:.2g}. Allow more with max_iterations"
+        f"still off by up to {max(extras.values()):.2g}, tolerance {tolerance:g}, and the last "
+        f"step changed an angle by a relative {moved:.2g}. Allow more with max_iterations"
     )

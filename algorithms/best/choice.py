@@ -62,18 +62,18 @@ def best_of(
             tried[name] = f"not tried: it may take longer than {seconds:g} s"
             continue
         try:
-            found = one.call(mesh, **given)
+            chosen = one.call(mesh, **given)
         except AlgorithmFailed as error:
             tried[name] = str(error)
         else:
-            folds = flipped_triangles(mesh, found.uv)
-            off = float(angle_errors(mesh, found.uv).mean())
+            folds = flipped_triangles(mesh, chosen.uv)
+            off = float(angle_errors(mesh, chosen.uv).mean())
             tried[name] = f"{folds:,} folds" if folds else off
             if best is None or (folds, off) < best[:2]:
-                best = folds, off, name, found
+                best = folds, off, name, chosen
         first = first or perf_counter() - start
     if best is None:
         causes = "; ".join(f"{name}: {why}" for name, why in tried.items())
         raise AlgorithmFailed(f"no algorithm has a map ({causes})")
-    *_, name, found = best
-    return replace(found, extras=found.extras | {"chosen": name, "tried": tried})
+    *_, name, chosen = best
+    return replace(chosen, extras=chosen.extras | {"chosen": name, "tried": tried})

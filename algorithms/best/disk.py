@@ -58,11 +58,11 @@ def best(
     degrees, before all this.
     """
     start = perf_counter()
-    found = best_of(mesh, CANDIDATES, seconds, repair=repair)
-    uv, steps = angle_gauge(mesh, found.uv), 0
+    chosen = best_of(mesh, CANDIDATES, seconds, repair=repair)
+    uv, steps = angle_gauge(mesh, chosen.uv), 0
     while steps < MOST_STEPS and perf_counter() - start < seconds:
         uv, taken = evened(mesh, uv, 1)
         if not taken:
             break
         steps += 1
-    return replace(found, uv=uv, extras=found.extras | {"even_steps": steps})
+    return replace(chosen, uv=uv, extras=chosen.extras | {"even_steps": steps})

@@ -69,12 +69,12 @@ def bff(
         domain, sweeps, change = _circular(yamabe, weights, tolerance, max_sweeps)
     uv = yamabe.bordered.harmonic_extension(domain.points)
     uv, folds = accepted_repair(mesh, uv, yamabe.L, repair=repair)
-    told = {
+    extras = {
         "sweeps": sweeps,
         "change": change,
         "gauss_bonnet": abs(float(yamabe.natural.sum()) - 2 * np.pi),
     }
-    return Parameterization(uv, extras={**told, **folds})
+    return Parameterization(uv, extras={**extras, **folds})
 
 
 def _turns(lengths: Real) -> Real:

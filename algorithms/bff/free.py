@@ -60,8 +60,8 @@ def bff_free(
         lengths = yamabe.scaled(yamabe.scale(turns))
     z, closing = closed_curve(lengths, turns)
     uv, folds = with_area_pi(mesh, yamabe.bordered.harmonic_extension(z), repair=repair)
-    told = {"closing": closing, "gauss_bonnet": abs(float(turns.sum()) - 2 * np.pi)}
-    return Parameterization(uv, extras={**told, **folds})
+    extras = {"closing": closing, "gauss_bonnet": abs(float(turns.sum()) - 2 * np.pi)}
+    return Parameterization(uv, extras={**extras, **folds})
 
 
 def _corners(lengths: Real, corners: int) -> Real:

@@ -74,11 +74,11 @@ class Crossings:
     @property
     def first_half_edge(self) -> list[int]:
         """The half-edge along each edge."""
-        found = [END] * len(self.on_edge)
+        first = [END] * len(self.on_edge)
         for h, (e, sign) in enumerate(zip(self.edge, self.sign, strict=True)):
             if sign > 0:
-                found[e] = h
-        return found
+                first[e] = h
+        return first
 
     def flip_all(self, rounds: Iterable[Indices]) -> None:
         """Flip edges that are given by half-edges, in rounds that share no triangle."""
@@ -88,11 +88,11 @@ class Crossings:
 
     def path(self, given: int) -> list[int]:
         """Return the crossings of a given edge, along it."""
-        found, at = [], self.first[given]
+        steps, at = [], self.first[given]
         while at != END:
-            found.append(at)
+            steps.append(at)
             at = self.after[at]
-        return found
+        return steps
 
     def _along(self, h: int) -> list[int]:
         """Return the crossings on a half-edge, along it."""
@@ -166,15 +166,15 @@ class Crossings:
         the other triangle, entered by `beyond`, by the sides of `back`; by the first of these they
         stay on the side of i.
         """
-        found = []
+        entering = []
         for x in self._along(side):
             y = self._inside(x, side)
             if y != END and self._leaves(x, y, leaving) == leaving[0]:
                 on_ij, y = y, self._inside(y, beyond)
                 if y == END or self._leaves(on_ij, y, back) == back[0]:
                     continue
-            found.append((x, y, self.side[x] != self.sign[side], self.given[x]))
-        return found
+            entering.append((x, y, self.side[x] != self.sign[side], self.given[x]))
+        return entering
 
     def _ending(self, side: int) -> list[tuple[int, int, bool, int]]:
         """Return the paths of :meth:`_across` from the opposite corner to a side on that of j."""
@@ -186,10 +186,10 @@ class Crossings:
 
     def _remove(self, x: int, h: int, e: int) -> None:
         """Take a crossing with the flipped edge out of its path."""
-        before, after, given = self.before[x], self.after[x], self.given[x]
+        before, after, segment = self.before[x], self.after[x], self.given[x]
         if before == after == END:  # from k to l or back: the new edge runs from l to k
-            self.along[e] = given, -1 if self.side[x] == self.sign[h] else 1
-        self._join(before, after, given)
+            self.along[e] = segment, -1 if self.side[x] == self.sign[h] else 1
+        self._join(before, after, segment)
 
     def _join(self, x: int, y: int, given: int) -> None:
         """Let y follow x on a given edge; END for its ends."""

@@ -72,25 +72,25 @@ def cetm(
     failed: AlgorithmFailed | None = None
     for v in map(int, tried):
         try:
-            F, found = _with_infinity_at(mesh, v, tolerance, max_iterations)
+            F, flattened = _with_infinity_at(mesh, v, tolerance, max_iterations)
             break
         except AlgorithmFailed as error:
             failed = error
     else:
         raise failed or AlgorithmFailed("there is no boundary vertex")
-    z = _half_plane(mesh, v, F, found)
+    z = _half_plane(mesh, v, F, flattened)
     uv = _on_disk(mesh, z, v)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
     kept = cross_ratio_change(mesh, uv)
     uv, folds = accepted_repair(mesh, uv, laplacian(mesh), repair=repair)
-    told = {
-        "curvature": found.residual,
-        "factorisations": found.factorisations,
+    extras = {
+        "curvature": flattened.residual,
+        "factorisations": flattened.factorisations,
         "cross_ratios": kept,
         "at_infinity": v,
     }
-    return Parameterization(uv, len(found.history) - 1, extras={**told, **folds})
+    return Parameterization(uv, len(flattened.history) - 1, extras={**extras, **folds})
 
 
 def _with_infinity_at(
@@ -106,7 +106,7 @@ def _with_infinity_at(
     u, link = _infinity(mesh, v, mesh.F[touching])
     flat = np.full(mesh.n, 2 * np.pi)
     flat[mesh.boundary] = np.pi
-    found = flat_metric(
+    flattened = flat_metric(
         F,
         side_lengths(mesh.V, F),
         u,
@@ -115,7 +115,7 @@ def _with_infinity_at(
         tolerance=tolerance,
         max_iterations=max_iterations,
     )
-    return F, found
+    return F, flattened
 
 
 def _checked_ear(mesh: DiskMesh) -> int | None:

@@ -107,12 +107,12 @@ def flat_metric(
     cholesky: Cholesky | None = None
     u = u.copy()
     with phase("angles"):
-        here, broken = angles(scaled(lengths, F, u))
-        gradient = (flat - angle_sums(F, here, n))[kept]
+        alpha, broken = angles(scaled(lengths, F, u))
+        gradient = (flat - angle_sums(F, alpha, n))[kept]
     history = [float(np.abs(gradient).max(initial=0.0))]
     while history[-1] > tolerance and len(history) <= max_iterations:
         with phase("assembly"):
-            A = pattern.block(half_cotangents_of(here, broken))
+            A = pattern.block(half_cotangents_of(alpha, broken))
         if cholesky is None:
             cholesky = Cholesky(A)
         else:
@@ -128,7 +128,7 @@ def flat_metric(
                 if float(missing @ step[kept]) <= -UPHILL * slope:
                     break
                 share /= 2
-        u, here, broken, gradient = u + share * step, there, lost, missing
+        u, alpha, broken, gradient = u + share * step, there, lost, missing
         history.append(float(np.abs(gradient).max()))
     if cholesky is not None:
         # One more step with the last factor, which takes the residual down to rounding for free.
@@ -137,8 +137,8 @@ def flat_metric(
         there, lost = angles(scaled(lengths, F, u + step))
         off = float(np.abs((flat - angle_sums(F, there, n))[kept]).max(initial=0.0))
         if off < history[-1]:
-            u, here, broken, history[-1] = u + step, there, lost, off
-    told = f"the angle sums are still off by up to {history[-1]:.2g} rad, tolerance {tolerance:g}"
+            u, alpha, broken, history[-1] = u + step, there, lost, off
+    why = f"the angle sums are still off by up to {history[-1]:.2g} rad, tolerance {tolerance:g}"
     if broken.any():
         raise AlgorithmFailed(
             f"{int(broken.sum())} of {len(F)} triangles cannot keep the triangle inequality: "
@@ -147,10 +147,17 @@ def flat_metric(
         )
     if history[-1] > tolerance:
         raise AlgorithmFailed(
-            f"{told}, after {len(history) - 1} Newton steps. Allow more with max_iterations"
+            f"{why}, after {len(history) - 1} Newton steps. Allow more with max_iterations"
         )
     if cholesky is None:  # already flat
-        cholesky = Cholesky(pattern.block(half_cotangents_of(here, broken)))
+        cholesky = Cholesky(pattern.block(half_cotangents_of(alpha, broken)))
     return FlatMetric(
-        u, scaled(lengths, F, u), here, history[-1], tuple(history), len(history), pattern, cholesky
+        u,
+        scaled(lengths, F, u),
+        alpha,
+        history[-1],
+        tuple(history),
+        len(history),
+        pattern,
+        cholesky,
     )

@@ -99,8 +99,8 @@ def cetm_flips(
     uv /= np.maximum(np.abs(uv), 1.0)
     uv = moved_to_gauge(uv, gauge_measure(mesh, gauge, b))
     uv[b] /= np.abs(uv[b])
-    uv, told = accepted_repair(mesh, uv, repair=repair)
-    return Parameterization(uv, flat.iterations, extras=told | flat.told)
+    uv, repaired = accepted_repair(mesh, uv, repair=repair)
+    return Parameterization(uv, flat.iterations, extras=repaired | flat.told)
 
 
 @dataclass(frozen=True)
@@ -160,13 +160,13 @@ def uniformised(
     u, residual, iterations = _flattened(T, double.half, cones, tolerance, max_iterations)
     with phase("layout"):
         P, z, off = _laid_out(T, u, cones, mesh.n)
-    told = {
+    extras = {
         "curvature": residual,
         "flips": T.flips,
         "layout": off,
         "corners": cones.tolist(),
     }
-    return Uniformised(T, u, P, z, iterations, told)
+    return Uniformised(T, u, P, z, iterations, extras)
 
 
 def _cones(mesh: DiskMesh, bordered: BorderedLaplacian) -> Indices:
@@ -207,16 +207,16 @@ def _flattened(
     def missing(u: Real) -> tuple[Real, Real, NDArray[np.bool_]]:
         v, before = u[half], T.flips
         with phase("angles"):
-            here, broken = angles(_sides(T, v))
+            corners, broken = angles(_sides(T, v))
         with phase("flips"):
-            opposite = np.roll(here, -2, axis=1).ravel()
+            opposite = np.roll(corners, -2, axis=1).ravel()
             T.make_delaunay(v, np.flatnonzero(opposite + opposite[T.twin] > np.pi - NEARLY))
         with phase("angles"):
             if T.flips > before:
-                here, broken = angles(_sides(T, v))
-            return flat - angle_sums(half[T.F], here, n), here, broken
+                corners, broken = angles(_sides(T, v))
+            return flat - angle_sums(half[T.F], corners, n), corners, broken
 
-    gradient, here, broken = missing(u)
+    gradient, measured, broken = missing(u)
     best = float(np.abs(gradient / copies).max())
     factor: Cholesky | None = None
     ordered = flips = 0
@@ -225,7 +225,7 @@ def _flattened(
             return u[half], best, iteration
         if factor is None or best > KEPT or T.flips > flips:
             with phase("assembly"):
-                H = laplacian_of_weights(half[T.F], half_cotangents_of(here, broken), n)
+                H = laplacian_of_weights(half[T.F], half_cotangents_of(measured, broken), n)
                 H = H[free][:, free]
             few = T.flips - ordered <= FEW * len(T.F)
             factor = Cholesky(H, like=factor if few else None)
@@ -239,7 +239,7 @@ def _flattened(
             if float(there @ step) <= -UPHILL * slope:
                 break
             share /= 2
-        u, gradient, here, broken = u + share * step, there, now, lost
+        u, gradient, measured, broken = u + share * step, there, now, lost
         best = float(np.abs(gradient / copies).max())
     raise AlgorithmFailed(
         f"the angle sums are still off by up to {best:.2g} rad after {most} Newton steps, "
@@ -297,18 +297,18 @@ def _to_corners(T: Triangulation, P: Complex, cones: Indices) -> tuple[complex, 
     images = [np.unique(np.round(P[np.int64(v) == T.F], 13)) for v in cones]
     area = np.abs(np.imag(np.conj(P[:, 1] - P[:, 0]) * (P[:, 2] - P[:, 0]))).sum() / 4
     side = np.sqrt(area * 4 / np.sqrt(3))
-    found: list[tuple[float, int, complex, complex]] = []
+    candidates: list[tuple[float, int, complex, complex]] = []
     for k in range(3):
         one, other = images[k], images[(k + 1) % 3]
         off = np.abs(np.abs(other - one[:, None]) / side - 1)
         i, j = np.unravel_index(int(np.argmin(off)), off.shape)
-        found.append((float(off[i, j]), k, complex(one[i]), complex(other[j])))
-    off, k, here, there = min(found, key=lambda one: one[0])
+        candidates.append((float(off[i, j]), k, complex(one[i]), complex(other[j])))
+    off, k, near, far = min(candidates, key=lambda one: one[0])
     if not off < 1e-3:
         raise AlgorithmFailed(
             f"the flat layout is not an equilateral triangle (off by {off:.2g}): double "
             "precision cannot resolve its positions"
         )
-    third = here + (there - here) * np.exp(1j * np.pi / 3)
-    centre = (here + there + third) / 3
-    return K / ((here, third, there)[k] - centre), centre
+    third = near + (far - near) * np.exp(1j * np.pi / 3)
+    centre = (near + far + third) / 3
+    return K / ((near, third, far)[k] - centre), centre

@@ -51,7 +51,7 @@ def cetm_free(
     b = mesh.boundary
     lengths = side_lengths(mesh.V, mesh.F)
     flat = np.full(mesh.n, 2 * np.pi)
-    found = flat_metric(
+    flattened = flat_metric(
         mesh.F,
         lengths,
         np.zeros(mesh.n),
@@ -60,20 +60,20 @@ def cetm_free(
         tolerance=tolerance,
         max_iterations=max_iterations,
     )
-    turns = np.pi - angle_sums(mesh.F, found.angles, mesh.n)[b]
+    turns = np.pi - angle_sums(mesh.F, flattened.angles, mesh.n)[b]
     z = np.zeros(mesh.n, dtype=np.complex128)
     z[b], closing = closed_curve(edge_lengths(mesh, b), turns)
     fixed = np.zeros(mesh.n, dtype=bool)
     fixed[b] = True
-    uv = found.laid_out(mesh.F, fixed, z)
+    uv = flattened.laid_out(mesh.F, fixed, z)
     uv, folds = with_area_pi(mesh, uv, repair=repair)
-    told = {
-        "curvature": found.residual,
-        "factorisations": found.factorisations,
+    extras = {
+        "curvature": flattened.residual,
+        "factorisations": flattened.factorisations,
         "closing": closing,
         "cross_ratios": cross_ratio_change(mesh, uv),
     }
-    return Parameterization(uv, len(found.history) - 1, extras={**told, **folds})
+    return Parameterization(uv, len(flattened.history) - 1, extras={**extras, **folds})
 
 
 def cross_ratio_change(mesh: DiskMesh, uv: NDArray[np.complex128]) -> float:

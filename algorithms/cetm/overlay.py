@@ -136,8 +136,8 @@ def refined_map(
     uv = moved_to_gauge(uv / np.maximum(np.abs(uv), 1.0), measure)
     uv[b] /= np.abs(uv[b])
     with_resort = repair and last_resort
-    uv, told = valid_map(fine, uv) if with_resort else accepted_repair(fine, uv, repair=repair)
-    return RefinedMap(fine, uv, triangle, flat.told | told | {"crossings": len(surface)})
+    uv, repaired = valid_map(fine, uv) if with_resort else accepted_repair(fine, uv, repair=repair)
+    return RefinedMap(fine, uv, triangle, flat.told | repaired | {"crossings": len(surface)})
 
 
 def _points(
@@ -150,8 +150,8 @@ def _points(
     chosen: Sequence[int],
 ) -> tuple[Real, Complex]:
     """Return the refined mesh's vertices in space, and in an image of the equilateral triangle."""
-    given, flipped = start.first_half_edge, paths.first_half_edge
-    h = np.array([given[paths.given[x]] for x in chosen], dtype=np.int64)
+    original, flipped = start.first_half_edge, paths.first_half_edge
+    h = np.array([original[paths.given[x]] for x in chosen], dtype=np.int64)
     f = np.array([flipped[paths.edge_of[x]] for x in chosen], dtype=np.int64)
     t = np.array([on_given[x] for x in chosen])[:, None]
     s = np.array([on_flipped[x] for x in chosen])
@@ -174,7 +174,7 @@ def _cells(
     for there in paths.on_edge:
         for x, before, after in zip(there, [END, *there], [*there[1:], END], strict=False):
             beside[x] = before, after
-    found: list[tuple[int, ...]] = []
+    cells: list[tuple[int, ...]] = []
     origin: list[int] = []
     for t, corners in enumerate(mesh.F.tolist()):
         around, at = [], dict[int, int]()
@@ -187,7 +187,7 @@ def _cells(
                 around.append(number[x])
                 sides.append((x, c))
         if not sides:
-            found.append(tuple(corners))
+            cells.append(tuple(corners))
             origin.append(t)
             continue
         place = {v: k for k, v in enumerate(around)}
@@ -198,9 +198,9 @@ def _cells(
             chords |= {(at[x], end), (end, at[x])}
         for cell in _faces(len(around), chords):
             some = _triangles([around[k] for k in cell], V, uv)
-            found += some
+            cells += some
             origin += [t] * len(some)
-    return np.array(found, dtype=np.int64), np.array(origin, dtype=np.int64)
+    return np.array(cells, dtype=np.int64), np.array(origin, dtype=np.int64)
 
 
 def _faces(count: int, chords: set[tuple[int, int]]) -> list[list[int]]:
@@ -246,7 +246,7 @@ def _triangles(cell: Sequence[int], V: Real, uv: Complex) -> list[tuple[int, ...
 
 def _straight(paths: Crossings, T: Triangulation) -> dict[int, Place]:
     """Return where straight lines in flat triangles cross their edges, by their crossings."""
-    found: dict[int, Place] = {}
+    places: dict[int, Place] = {}
     length = np.exp(T.log_length).tolist()
     for path, behind in _behind(paths, T):
         ends = _unfolded(T, length, behind)
@@ -255,15 +255,15 @@ def _straight(paths: Crossings, T: Triangulation) -> dict[int, Place]:
             left, right = (q.conjugate() * a).imag, (q.conjugate() * b).imag
             s = left / (left - right) if left != right else np.nan
             t = ((a + s * (b - a)) / q).real
-            found[x] = t, s if paths.side[x] > 0 else 1 - s
-    return found
+            places[x] = t, s if paths.side[x] > 0 else 1 - s
+    return places
 
 
 def _behind(paths: Crossings, T: Triangulation) -> Iterator[tuple[list[int], list[int]]]:
     """Give each given edge's crossings, with the half-edges whose triangles lie behind these."""
     along = paths.first_half_edge
-    for given in range(len(paths.first)):
-        if path := paths.path(given):
+    for edge in range(len(paths.first)):
+        if path := paths.path(edge):
             ways = [(x, along[paths.edge_of[x]]) for x in path]
             yield path, [h if paths.side[x] > 0 else int(T.twin[h]) for x, h in ways]
 
@@ -277,20 +277,20 @@ def _unfolded(
     pa, pb = length[t + (c + 2) % 3], length[t + (c + 1) % 3]
     a: complex = pa + 0j
     b = _tip(0j, a, pb, length[h])
-    found = [(a, b)]
+    corners = [(a, b)]
     for before, h in [*pairwise(behind), (behind[-1], -1)]:
         entered = int(T.twin[before])
         t, c = entered - entered % 3, entered % 3
-        a, b = found[-1]
+        a, b = corners[-1]
         # The triangle ahead lies on the left of the way from b to a.
         tip = _tip(b, a, length[t + (c + 2) % 3], length[t + (c + 1) % 3])
         if h < 0:
-            found.append((tip, tip))
+            corners.append((tip, tip))
         elif h == t + (c + 1) % 3:
-            found.append((a, tip))
+            corners.append((a, tip))
         else:
-            found.append((tip, b))
-    return found
+            corners.append((tip, b))
+    return corners
 
 
 def _tip(a: complex, b: complex, from_a: float, from_b: float) -> complex:
@@ -368,20 +368,20 @@ def _distances(
     """
     h = behind[0]
     t, c = h - h % 3, h % 3
-    found = [(log_length[t + (c + 2) % 3], log_length[t + (c + 1) % 3])]
+    lengths = [(log_length[t + (c + 2) % 3], log_length[t + (c + 1) % 3])]
     for before, h in pairwise(behind):
         entered = int(T.twin[before])
-        pa, pb = found[-1]
+        pa, pb = lengths[-1]
         t, c = h - h % 3, h % 3
         following, other = log_length[t + (c + 1) % 3], log_length[t + (c + 2) % 3]
         # Ptolemy: the diagonals from p to the new corner, and ab, of a quadrilateral.
         if entered == t + (c + 2) % 3:  # the new edge runs from a to the new corner
             far = np.logaddexp(following + pa, log_length[h] + pb) - other
-            found.append((pa, float(far)))
+            lengths.append((pa, float(far)))
         else:  # from the new corner to b
             far = np.logaddexp(log_length[h] + pa, other + pb) - following
-            found.append((float(far), pb))
-    return found
+            lengths.append((float(far), pb))
+    return lengths
 
 
 def _share(x: float, y: float) -> float:

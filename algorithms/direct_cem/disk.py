@@ -91,21 +91,21 @@ def direct_cem(
     until = {"tolerance": tolerance, "max_iterations": max_iterations}
     own_gauge = gauge == "triangle"
     solved = _by_solves(mesh, L, measures, own_gauge, **until)
-    start, begun, found, extended = solved or _by_factor(mesh, L, measures, own_gauge, **until)
-    energies = found.energies
+    start, begun, minimum, extended = solved or _by_factor(mesh, L, measures, own_gauge, **until)
+    energies = minimum.energies
     share = _share(back, energies) if begun == "harmonic measure" else 0.0
-    here = found.model
+    model = minimum.model
     if share:
-        here = here.at(in_gauge(here.domain.towards(start, share), here.weights))
-        energies += (here.energy,)
-    uv = extended(here.domain.points)
+        model = model.at(in_gauge(model.domain.towards(start, share), model.weights))
+        energies += (model.energy,)
+    uv = extended(model.domain.points)
     uv, folds = accepted_repair(mesh, uv, L, repair=repair)
     extras = {
-        "stopped": found.reason,
-        "gradient": None if found.reason == "crowded" else found.gradient,
+        "stopped": minimum.reason,
+        "gradient": None if minimum.reason == "crowded" else minimum.gradient,
         "start": begun,
-        "hessian_products": found.products,
-        "held_arcs": found.held_arcs,
+        "hessian_products": minimum.products,
+        "held_arcs": minimum.held_arcs,
         **folds,
     }
     return Parameterization(uv, len(energies) - 1, energies, extras)
@@ -120,8 +120,8 @@ def _by_factor(
     seen, weights = bordered.swept_to_boundary(measures).T
     start, begun = _start(S, _starts(mesh, seen), weights)
     held = weights if own_gauge else start.outer_measure
-    found = minimise(S, start, held, **until)
-    return start, begun, found, bordered.harmonic_extension
+    minimum = minimise(S, start, held, **until)
+    return start, begun, minimum, bordered.harmonic_extension
 
 
 def _by_solves(
@@ -135,15 +135,15 @@ def _by_solves(
     arcs, begun = _starts(mesh, seen), "harmonic measure"
     start = in_gauge(CircleDomain.of_arcs(arcs[begun]), weights)
     S = interior.dirichlet_to_neumann(start.arcs)
-    here = _at_start(S, start, weights, own_gauge)
+    model = _at_start(S, start, weights, own_gauge)
     otherwise = in_gauge(CircleDomain.of_arcs(arcs["arc length"]), weights)
-    if estimated_energy(otherwise.points, start.arcs) < SURELY_MORE * here.energy:
+    if estimated_energy(otherwise.points, start.arcs) < SURELY_MORE * model.energy:
         start, begun = _start(S, arcs, weights)
-        here = _at_start(S, start, weights, own_gauge)
-    found = quasi_newton_minimum(here, **until)
-    if found is None:
+        model = _at_start(S, start, weights, own_gauge)
+    minimum = quasi_newton_minimum(model, **until)
+    if minimum is None:
         return None
-    return start, begun, found, interior.harmonic_extension
+    return start, begun, minimum, interior.harmonic_extension
 
 
 def _at_start(

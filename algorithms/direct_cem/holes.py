@@ -88,22 +88,22 @@ def direct_cem_holes(
     chart = start.rims.outer
     start = start if chart else in_gauge(start, weights)
     held = weights if gauge == "triangle" and not chart else start.outer_measure
-    found = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
+    minimum = minimise(S, start, held, tolerance=tolerance, max_iterations=max_iterations)
     angle_error = SampledAngleError(mesh)
-    here, settled = _settled(found.model, start, bordered.harmonic_extension, angle_error)
-    energies = found.energies + ((here.energy,) if settled else ())
+    model, settled = _settled(minimum.model, start, bordered.harmonic_extension, angle_error)
+    energies = minimum.energies + ((model.energy,) if settled else ())
     if chart:
-        here = here.at(in_gauge(here.domain.inside_out(0), weights))
-    steps = STEPS if gauge == "boundary" and found.reason == "gradient" else 0
-    uv, walked = gauge_walk(here, bordered.harmonic_extension, angle_error, steps)
+        model = model.at(in_gauge(model.domain.inside_out(0), weights))
+    steps = STEPS if gauge == "boundary" and minimum.reason == "gradient" else 0
+    uv, walked = gauge_walk(model, bordered.harmonic_extension, angle_error, steps)
     energies += () if chart else walked
     uv, folds = valid_with_holes(mesh, (widest, *holes), uv, repair=repair, last_resort=last_resort)
     extras = {
-        "stopped": found.reason,
-        "gradient": None if found.reason == "crowded" else found.gradient,
+        "stopped": minimum.reason,
+        "gradient": None if minimum.reason == "crowded" else minimum.gradient,
         "gauge_steps": len(walked),
-        "hessian_products": found.products,
-        "held_arcs": found.held_arcs,
+        "hessian_products": minimum.products,
+        "held_arcs": minimum.held_arcs,
         "settled": settled,
         "outside_while_minimised": int(widest[0] if not chart else holes[chart - 1][0]),
         **folds,
@@ -121,8 +121,8 @@ def _only_loop_with_ears(mesh: HoledMesh) -> int | None:
         of[loop] = k
     corners = of[mesh.F]
     alike = (corners[:, 0] >= 0) & (np.ptp(corners, axis=1) == 0)
-    found = np.unique(corners[alike, 0])
-    return int(mesh.loops[int(found[0])][0]) if len(found) == 1 else None
+    loops = np.unique(corners[alike, 0])
+    return int(mesh.loops[int(loops[0])][0]) if len(loops) == 1 else None
 
 
 def _annulus(

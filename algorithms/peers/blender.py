@@ -28,8 +28,8 @@ _SCRIPT = Path(__file__).with_name("blender_unwrap.py")
 def blender_command() -> str:
     """Return the command that runs the script with the Blender that is installed."""
     named = os.environ.get(VARIABLE, "")
-    here = sys.executable if importlib.util.find_spec("bpy") else ""
-    program = named or here or "blender"
+    this_python = sys.executable if importlib.util.find_spec("bpy") else ""
+    program = named or this_python or "blender"
     words = [program, str(_SCRIPT)]
     if "blender" in Path(program).name:
         words = [program, "--background", "--factory-startup", "--python", str(_SCRIPT), "--"]

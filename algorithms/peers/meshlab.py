@@ -57,12 +57,12 @@ def meshlab_voronoi(
     """Map a surface by MeshLab's atlas of Voronoi regions."""
     meshes = _loaded(mesh)
     _apply(meshes, "generate_voronoi_atlas_parametrization", regionnum=regions)
-    found = meshes.mesh(meshes.mesh_number() - 1)  # the surface differs from the given one
-    V, F = found.vertex_matrix(), found.face_matrix().astype(np.int64)
-    if found.has_wedge_tex_coord():
-        uv, index = found.wedge_tex_coord_matrix(), np.arange(F.size).reshape(-1, 3)
+    charts = meshes.mesh(meshes.mesh_number() - 1)  # the surface differs from the given one
+    V, F = charts.vertex_matrix(), charts.face_matrix().astype(np.int64)
+    if charts.has_wedge_tex_coord():
+        uv, index = charts.wedge_tex_coord_matrix(), np.arange(F.size).reshape(-1, 3)
     else:
-        uv, index = found.vertex_tex_coord_matrix(), F
+        uv, index = charts.vertex_tex_coord_matrix(), F
     return Atlas(uv_of_corners(Soup.of_triangles(V, F, complex_of(uv), index), mesh.V, mesh.F))
 
 

@@ -76,11 +76,11 @@ def algorithm_names(mesh_type: type[TriangleMesh]) -> list[str]:
 
 def field_names() -> list[str]:
     """The other algorithms of the field that take a disk, which runs measure if they are named."""
-    found = load_registry().algorithms.values()
+    algorithms = load_registry().algorithms.values()
     choose = ("best", "best-holes")  # they call the others
     return sorted(
         a.name
-        for a in found
+        for a in algorithms
         if not a.usual and a.name not in choose and issubclass(DiskMesh, a.mesh_type)
     )
 

@@ -101,13 +101,14 @@ def from_api(
                 names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
-        def command(**given: Any) -> None:
+        def command(**options: Any) -> None:
             try:
                 taken = {
-                    name: _value(argument, given.pop(name)) for name, argument in arguments.items()
+                    name: _value(argument, options.pop(name))
+                    for name, argument in arguments.items()
                 }
-                with hushed(given.pop("quiet")):
-                    body(partial(function, **taken), **given)
+                with hushed(options.pop("quiet")):
+                    body(partial(function, **taken), **options)
             except CembenchError as error:
                 error.reword(NAMES | names)
                 raise

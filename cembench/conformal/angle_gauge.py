@@ -56,7 +56,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
 
     sampled = SampledAngleError(mesh)
     own = sampled(uv)
-    found = minimize(
+    minimum = minimize(
         lambda move: sampled(_moved(mesh, uv, move)),
         np.zeros(2),
         method="Nelder-Mead",
@@ -67,7 +67,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
             "maxfev": MOST_MAPS,
         },
     )
-    moved = _moved(mesh, uv, found.x)
+    moved = _moved(mesh, uv, minimum.x)
     better = angle_errors(mesh, moved).mean() < angle_errors(mesh, uv).mean()
     if better and flipped_triangles(mesh, moved) <= flipped_triangles(mesh, uv):
         return moved

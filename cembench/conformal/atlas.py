@@ -65,12 +65,12 @@ def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
     """Cut a surface where the images of its corners (m, 3) differ."""
     F = mesh.F
     keys = np.stack([F.ravel().astype(np.float64), corners.real.ravel(), corners.imag.ravel()])
-    found, index = np.unique(keys, axis=1, return_inverse=True)
+    unique, index = np.unique(keys, axis=1, return_inverse=True)
     G = index.reshape(F.shape).astype(np.int64)
-    surface = TriangleMesh.trusted(mesh.V[found[0].astype(np.int64)], G, mesh.name)
+    surface = TriangleMesh.trusted(mesh.V[unique[0].astype(np.int64)], G, mesh.name)
     island, seams = _islands_and_seams(F, G)
     length = float(np.linalg.norm(mesh.V[seams[:, 0]] - mesh.V[seams[:, 1]], axis=1).sum())
-    uv = found[1] + 1j * found[2]
+    uv = unique[1] + 1j * unique[2]
     areas = np.bincount(island, np.nan_to_num(signed_areas(uv, G)))
     turned = areas < 0
     of_turned = np.unique(G[turned[island]])

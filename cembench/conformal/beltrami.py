@@ -58,8 +58,8 @@ def _dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> N
         root = double_areas(V, F) / (2 * np.abs(area))
         whole = E + G + 2 * root
         modulus = np.hypot(E - G, 2 * mixed) / whole
-        found = (1 + modulus) ** 2 * whole / (4 * root)
-    return np.where(np.isnan(found), np.inf, found)
+        dilatations = (1 + modulus) ** 2 * whole / (4 * root)
+    return np.where(np.isnan(dilatations), np.inf, dilatations)
 
 
 def _first_fundamental_form(

@@ -139,8 +139,8 @@ class BorderedLaplacian:
 
     def solved_boundary(self, rhs: Complex) -> Complex:
         """The boundary values of L f = rhs (n,), 0 in sum, with f = 0 at the last of them."""
-        found = self._whole.solve_trailing(rhs[self._order][:-1])
-        return np.append(found, 0.0)[-len(self.boundary) :]
+        solved = self._whole.solve_trailing(rhs[self._order][:-1])
+        return np.append(solved, 0.0)[-len(self.boundary) :]
 
     def solve_interior(self, rhs_i: NDArray[Any]) -> NDArray[Any]:
         """Return f_i with L_ii f_i = rhs_i; not in the ring's order."""

@@ -98,38 +98,38 @@ def minimise(
         The gauge cannot be reached.
 
     """
-    here = EnergyModel(S, in_gauge(start, weights), weights)
-    energies, radius, products = [here.energy], 1.0, 0
+    model = EnergyModel(S, in_gauge(start, weights), weights)
+    energies, radius, products = [model.energy], 1.0, 0
     while True:
-        if len(here.held) > MOST_HELD:
+        if len(model.held) > MOST_HELD:
             reason = "crowded"
             break
-        if here.gradient_norm**2 <= 2 * tolerance * here.energy:
+        if model.gradient_norm**2 <= 2 * tolerance * model.energy:
             reason = "gradient"
             break
         if len(energies) > max_iterations:
             reason = "iterations"
             break
         with phase("boundary step"):
-            accuracy = float(np.clip(here.gradient_norm, *ACCURACY))
+            accuracy = float(np.clip(model.gradient_norm, *ACCURACY))
             step = newton_step(
-                here.gradient, here.uphill, here.hessian, here.precondition, radius, accuracy
+                model.gradient, model.uphill, model.hessian, model.precondition, radius, accuracy
             )
         products += step.products
         if not step.decrease >= ROUNDING * len(weights):
             reason = "rounding"
             break
-        there = _tried(here, step.p)
-        agreement = (here.energy - there.energy) / step.decrease if there else -np.inf
+        there = _tried(model, step.p)
+        agreement = (model.energy - there.energy) / step.decrease if there else -np.inf
         if agreement > 0.75 and step.at_edge:
             radius *= 3
         elif not agreement > 0.25:
             radius = step.length / 4
-        if there and agreement > 1e-4 and there.energy < here.energy:
-            here = there
-            energies.append(here.energy)
-    gradient = float("nan") if reason == "crowded" else here.gradient_norm
-    return Minimum(here, tuple(energies), gradient, reason, products, len(here.held))
+        if there and agreement > 1e-4 and there.energy < model.energy:
+            model = there
+            energies.append(model.energy)
+    gradient = float("nan") if reason == "crowded" else model.gradient_norm
+    return Minimum(model, tuple(energies), gradient, reason, products, len(model.held))
 
 
 def moebius_descent(here: EnergyModel, max_modulus: float) -> complex:

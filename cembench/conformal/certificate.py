@@ -315,5 +315,5 @@ def disk_modulus(z: Complex) -> float:
         return float("nan")
     a, b, c, d = z.tolist()
     whole = abs(a - c) * abs(b - d)  # Ptolemy: the sum of the products of opposite sides
-    here, there = abs(a - b) * abs(c - d) / whole, abs(b - c) * abs(d - a) / whole
-    return float(ellipkm1(there) / ellipkm1(here))
+    near, far = abs(a - b) * abs(c - d) / whole, abs(b - c) * abs(d - a) / whole
+    return float(ellipkm1(far) / ellipkm1(near))

@@ -73,9 +73,9 @@ def _fitted(centres: Complex, radii: Real, powers: int) -> tuple[Real, float]:
     values = np.repeat(np.eye(k + 1)[:, 1:], count, axis=0)
     fitted, between = (_series(centres, radii, powers, count, shift) for shift in (0, 0.5))
     Q, R = scipy.linalg.qr(fitted, mode="economic", overwrite_a=True, check_finite=False)
-    found = scipy.linalg.solve_triangular(R, Q.T @ values)
-    C = -2 * np.pi * found[:k].T
-    return (C + C.T) / 2, 2 * float(np.abs(between @ found - values).max())
+    coefficients = scipy.linalg.solve_triangular(R, Q.T @ values)
+    C = -2 * np.pi * coefficients[:k].T
+    return (C + C.T) / 2, 2 * float(np.abs(between @ coefficients - values).max())
 
 
 def _series(centres: Complex, radii: Real, powers: int, count: int, shift: float) -> Real:

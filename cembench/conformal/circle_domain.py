@@ -250,8 +250,8 @@ class CircleDomain:
         if len(rims.holes):
             # The centre of an image is the image of the pole's reflection in the circle.
             c, r, pole = self.centres, self.radii, -phi.d / phi.c
-            found = phi(c + r**2 / np.conj(pole - c + (pole == c)) * (pole != c))
-            centres[rims.holes] = found[rims.holes]
+            mapped = phi(c + r**2 / np.conj(pole - c + (pole == c)) * (pole != c))
+            centres[rims.holes] = mapped[rims.holes]
             radii[rims.holes] = np.abs(image[rims.starts] - centres)[rims.holes]
             turned = (image - centres[rims.loop]) / radii[rims.loop]
         # Half a chord and its distance from the centre, whose sign may be lost in rounding.

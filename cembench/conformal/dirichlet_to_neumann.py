@@ -40,8 +40,8 @@ class DirichletToNeumann:
 
     def __call__(self, f: NDArray[Any]) -> NDArray[Any]:
         """Return S f for f (B,) or (B, k), real or complex."""
-        found = by_real_columns(self._times, (f - f[-1])[:-1])
-        return np.concatenate([found, -found.sum(axis=0, keepdims=True)])
+        derivative = by_real_columns(self._times, (f - f[-1])[:-1])
+        return np.concatenate([derivative, -derivative.sum(axis=0, keepdims=True)])
 
     def inverse(self, g: Real) -> Real:
         """Return (S + m m^T)^-1 g with m = 1 / B, the inverse up to constants; g (B,) or (B, k)."""

@@ -39,11 +39,11 @@ def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
     broken = np.asarray((spare[0] <= 0) | (spare[1] <= 0) | (spare[2] <= 0))
     spare[:, broken] = 1.0
     x, y, z = spare
-    found = 2 * np.arctan2(np.sqrt(x * y * z / (x + y + z)), spare).T
-    found[broken] = np.where(
+    radians = 2 * np.arctan2(np.sqrt(x * y * z / (x + y + z)), spare).T
+    radians[broken] = np.where(
         lengths[broken] == lengths[broken].max(axis=1, keepdims=True), np.pi, 0.0
     )
-    return found, broken
+    return radians, broken
 
 
 def half_cotangents_of(angles: Real, broken: NDArray[np.bool_]) -> Real:
@@ -130,10 +130,10 @@ class BlockPattern:
         known = np.where(free, 0, f)
         i, j = self._ends.T
         right = np.zeros(self._n, dtype=np.complex128)
-        for here, there in ((i, j), (j, i)):
-            given = w * known[there]
-            right += np.bincount(here, given.real, self._n) + 1j * np.bincount(
-                here, given.imag, self._n
+        for row, column in ((i, j), (j, i)):
+            moved = w * known[column]
+            right += np.bincount(row, moved.real, self._n) + 1j * np.bincount(
+                row, moved.imag, self._n
             )
         right[~free] = f[~free]
         open_ = free[self._ends[self._inside]].all(axis=1)

@@ -85,10 +85,10 @@ def filled_start(
     columns = S(unit)
     filled = columns[inner]
     for k in rims.holes:
-        here = np.flatnonzero(rims.loop[inner] == k)
-        even = np.maximum(arcs[inner][here], PATCH_SHARE * 2 * np.pi / len(here))
+        on_rim = np.flatnonzero(rims.loop[inner] == k)
+        even = np.maximum(arcs[inner][on_rim], PATCH_SHARE * 2 * np.pi / len(on_rim))
         even = _of_circle(even)
-        filled[np.ix_(here, here)] += disk_patch(np.cumsum(even) - even)
+        filled[np.ix_(on_rim, on_rim)] += disk_patch(np.cumsum(even) - even)
     to_holes = np.linalg.solve(filled, columns[rim].T)  # minus the harmonic extension
     domains = []
     for measure in (seen, np.where(rims.on_outer, 0.0, own) / len(rims.holes)):
@@ -129,10 +129,10 @@ def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> C
     z[~rims.on_outer] = to_holes @ z[rims.on_outer]
     centres, similarities = np.zeros(len(rims.sizes), complex), np.ones(len(rims.sizes), complex)
     for k in rims.holes:
-        here = _parts(rims)[k]
-        image, along = z[here], arcs[here]
+        own = _parts(rims)[k]
+        image, along = z[own], arcs[own]
         centres[k] = (along + np.roll(along, 1)) @ image / (4 * np.pi)
-        along = arcs[here] = _arcs_about(image - centres[k], along)
+        along = arcs[own] = _arcs_about(image - centres[k], along)
         circle = np.exp(-1j * (np.cumsum(along) - along))
         similarities[k] = (along + np.roll(along, 1)) @ ((image - centres[k]) * circle.conj())
     radii = np.abs(similarities) / (4 * np.pi)

@@ -136,9 +136,9 @@ class InteriorLaplacian:
                 return np.asarray(turn * inside)
         with phase("assembly"):
             right = -(self._L_nb @ f_b)
-        found: Complex = self._near.solve(right)
-        self._maps = [(f_b, found), *self._maps[: KEPT - 1]]
-        return found
+        values: Complex = self._near.solve(right)
+        self._maps = [(f_b, values), *self._maps[: KEPT - 1]]
+        return values
 
     def harmonic_extension(self, f_b: Complex) -> Complex:
         """Return the harmonic map (n,) with these boundary values, by little over half a solve."""

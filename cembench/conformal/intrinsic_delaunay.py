@@ -65,8 +65,8 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
         flipped = corners.sharing_no_triangle(wrong)
         touched = corners.flip(wrong[flipped])
         waiting = np.concatenate([wrong[~flipped], touched])
-    found = corners.vertex.reshape(-1, 3), corners.length.reshape(-1, 3)
-    return *found, corners.weight.reshape(-1, 3)
+    mesh_and_lengths = corners.vertex.reshape(-1, 3), corners.length.reshape(-1, 3)
+    return *mesh_and_lengths, corners.weight.reshape(-1, 3)
 
 
 def _is_delaunay(F: Indices, lengths: Real, weights: Real) -> bool:

@@ -520,15 +520,15 @@ def metrics_markdown() -> str:
 
 def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
     """Return a sentence for each meaningless value: not finite, or an impossible energy."""
-    found = [
+    lost = [
         f"{name} is {value}, which is not a figure"
         for name, value in metrics.items()
         if not np.isfinite(value)
     ]
     energy, whole = metrics["conformal_energy"], metrics["dirichlet_energy"]
     if energy < -LEAST_ENERGY * abs(whole):
-        found.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
-    return [Notice(NoticeKind.LOST_IN_ROUNDING, told) for told in found]
+        lost.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
+    return [Notice(NoticeKind.LOST_IN_ROUNDING, text) for text in lost]
 
 
 def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
@@ -561,5 +561,5 @@ def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
 
 def computed(metrics: Iterable[Metric], figures: MapFigures) -> dict[str, float | int]:
     """Return the metrics that apply to a map, by name."""
-    found = ((metric.name, metric.compute(figures)) for metric in metrics)
-    return {name: value for name, value in found if value is not None}
+    values = ((metric.name, metric.compute(figures)) for metric in metrics)
+    return {name: value for name, value in values if value is not None}

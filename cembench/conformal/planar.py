@@ -190,11 +190,11 @@ def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int6
 
     The curves are given by their sides, from `starts` to `ends` (b,); no point lies on a side.
     """
-    found = np.empty(len(points), dtype=np.int64)
+    turns = np.empty(len(points), dtype=np.int64)
     step = max(1, AT_ONCE // len(starts))
     for k in range(0, len(points), step):
         a, b = (z - points[k : k + step, None] for z in (starts, ends))
         left = np.imag(np.conj(a) * b)
         up, down = (a.imag <= 0) & (b.imag > 0), (a.imag > 0) & (b.imag <= 0)
-        found[k : k + step] = (up & (left > 0)).sum(axis=1) - (down & (left < 0)).sum(axis=1)
-    return found
+        turns[k : k + step] = (up & (left > 0)).sum(axis=1) - (down & (left < 0)).sum(axis=1)
+    return turns

@@ -75,10 +75,10 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: int, grid: Grid = "squa
         x = (np.arange(side) + 0.5) / side - 0.5
         points = np.asarray(middle + extent * (x[None, :] + 1j * x[::-1, None]))
     face, weights = locate(z, mesh.F, points.ravel(), nearest=grid == "square")
-    found = np.full((side * side, 3), np.nan)
+    pixels = np.full((side * side, 3), np.nan)
     inside = face >= 0
-    found[inside] = interpolated(weights[inside], mesh.V[mesh.F[face[inside]]])
-    return found.reshape(side, side, 3)
+    pixels[inside] = interpolated(weights[inside], mesh.V[mesh.F[face[inside]]])
+    return pixels.reshape(side, side, 3)
 
 
 def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh, Complex]:

@@ -139,9 +139,9 @@ class _Patches:
     def least(self, moving: Complex) -> Real:
         """Return the least D of each patch."""
         f_z, f_zbar = self._maps(moving)
-        found = np.full(self.count, np.inf)
-        np.minimum.at(found, self._of, np.abs(f_z) ** 2 - np.abs(f_zbar) ** 2)
-        return found
+        least = np.full(self.count, np.inf)
+        np.minimum.at(least, self._of, np.abs(f_z) ** 2 - np.abs(f_zbar) ** 2)
+        return least
 
     def _energy(self, moving: Complex, eps: Real) -> Real:
         f_z, f_zbar = self._maps(moving)

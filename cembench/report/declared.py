@@ -258,7 +258,7 @@ def _of_surfaces(
     frame: pd.DataFrame,
     surfaces: Sequence[MeasuredSurface],
     name: str,
-    told: Mapping[str, str],
+    texts_of_run: Mapping[str, str],
     notes: Sequence[str],
 ) -> Table:
     """Return a table of surfaces: columns by algorithm if each names it in its group."""
@@ -266,7 +266,11 @@ def _of_surfaces(
     series = [evidence.series[k] for k in sorted(frame["series"].unique())]
     policy, *several = frame["solves"].unique()
     policy = None if several else policy
-    known = {**told, "surfaces": len(surfaces), "here": POLICIES.get(policy or "", str(policy))}
+    known = {
+        **texts_of_run,
+        "surfaces": len(surfaces),
+        "here": POLICIES.get(policy or "", str(policy)),
+    }
     quantities = []
     for one in spec.columns:
         for s in series:
@@ -367,8 +371,8 @@ def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iter
         if "causes" in spec.notes and record.outcome.status != "ok":
             yield f"{where}: {evidence.missing_reason(record)}"
         if "notices" in spec.notes:
-            if told := seconds_words(record):
-                yield f"{where}: {told}"
+            if text := seconds_words(record):
+                yield f"{where}: {text}"
             yield from (f"{where}: {note}" for note in record.outcome.notes)
     others = sorted({record.target for record in records} - {DISK})
     if "targets" in spec.notes and others:

@@ -147,8 +147,8 @@ def pack(
             for name, content in {**files, METADATA: json.dumps(crate, indent=1).encode()}.items():
                 # Of a fixed date: equal runs give equal bytes.
                 archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
-        with unpacked([draft]) as found:
-            (sent,) = found.values()
+        with unpacked([draft]) as submissions:
+            (sent,) = submissions.values()
         if sent.faults:
             raise RecordError(
                 f"{run.folder} was not packed, as a collection would refuse it:\n"
@@ -258,7 +258,9 @@ def _tool(place: str, environment: Mapping[str, Any]) -> dict[str, Any]:
         name="cembench",
         softwareVersion=str(environment.get("cembench") or "unknown"),
         identifier=(environment.get("git") or {}).get("commit"),
-        softwareRequirements=[f"{name} {found}" for name, found in libraries.items() if found],
+        softwareRequirements=[
+            f"{name} {version}" for name, version in libraries.items() if version
+        ],
         operatingSystem=environment.get("platform"),
         processorRequirements=machine_of(environment) + f": {environment.get('cpu') or ''}",
     )
@@ -266,12 +268,12 @@ def _tool(place: str, environment: Mapping[str, Any]) -> dict[str, Any]:
 
 def bundles_in(place: Path) -> list[Path]:
     """Return the bundles in a folder, or the one that a file is; raise where there is none."""
-    found = [place] if place.is_file() else files_in(place, f"*{SUFFIX}")
-    if not found:
+    files = [place] if place.is_file() else files_in(place, f"*{SUFFIX}")
+    if not files:
         raise RecordError(
             f"{place} holds no bundle, which are files *{SUFFIX}. Make one with `cembench submit`."
         )
-    return found
+    return files
 
 
 def is_bundle(place: Path) -> bool:
@@ -284,15 +286,15 @@ def is_bundle(place: Path) -> bool:
 @contextmanager
 def accepted(paths: Sequence[Path]) -> Iterator[list[Path]]:
     """Unpack bundles into temporary folders; raise :class:`RecordError` if one is refused."""
-    with unpacked(paths) as found:
-        refused = [f"  {one.name}: {one.faults[0]}" for one in found.values() if one.faults]
+    with unpacked(paths) as submissions:
+        refused = [f"  {one.name}: {one.faults[0]}" for one in submissions.values() if one.faults]
         if refused:
             raise RecordError(
                 "some bundles are refused:\n"
                 + "\n".join(refused)
                 + "\nLeave them out; `cembench submissions check` lists all that is wrong."
             )
-        yield list(found)
+        yield list(submissions)
 
 
 @contextmanager
@@ -304,7 +306,7 @@ def unpacked(
     With `signers`, a file of allowed ones, each has to be signed by one of them.
     """
     names = distinct_slugs({str(path): path.stem for path in paths})
-    found: dict[Path, Submission] = {}
+    submissions: dict[Path, Submission] = {}
     records: dict[str, Sequence[Record]] = {}
     with tempfile.TemporaryDirectory(prefix="cembench-") as above:
         for path in paths:
@@ -312,16 +314,20 @@ def unpacked(
             folder = Path(above) / name
             folder.mkdir()
             try:
-                found[folder], records[name] = _checked(name, path, folder)
-                if signers is not None and found[folder].accepted:
-                    found[folder] = replace(found[folder], signer=signer(folder, signers))
+                submissions[folder], records[name] = _checked(name, path, folder)
+                if signers is not None and submissions[folder].accepted:
+                    submissions[folder] = replace(
+                        submissions[folder], signer=signer(folder, signers)
+                    )
             except RecordError as error:
-                about = found.get(folder, Submission(name))
-                found[folder] = replace(about, faults=(str(error),))
-        sound = {one.name: records[one.name] for one in found.values() if one.accepted}
+                about = submissions.get(folder, Submission(name))
+                submissions[folder] = replace(about, faults=(str(error),))
+        sound = {one.name: records[one.name] for one in submissions.values() if one.accepted}
         for name, far in far_from_others(sound).items():
-            found[Path(above) / name] = replace(found[Path(above) / name], faults=tuple(far))
-        yield found
+            submissions[Path(above) / name] = replace(
+                submissions[Path(above) / name], faults=tuple(far)
+            )
+        yield submissions
 
 
 def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[Record]]:
@@ -389,13 +395,13 @@ def _unsafe(members: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
 
 def _other_files(folder: Path, names: Sequence[str]) -> Iterator[str]:
     """Yield how the files differ from what the metadata says of them."""
-    told = _hashes(folder / METADATA)
-    for name in sorted({*told, *names} - {METADATA}):
-        if name not in told:
+    stated = _hashes(folder / METADATA)
+    for name in sorted({*stated, *names} - {METADATA}):
+        if name not in stated:
             yield f"{name} is not in {METADATA}"
         elif name not in names:
             yield f"{name} is missing"
-        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != told[name]:
+        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != stated[name]:
             yield f"{name} does not have the SHA-256 that {METADATA} gives it"
 
 
@@ -472,17 +478,17 @@ def far_from_others(records: Mapping[str, Sequence[Record]]) -> dict[str, list[s
         for record in own:
             if (units := kernel_units(record)) is not None:
                 scaled.setdefault(record.cell.key, {})[name] = units, record.cell.label
-    found: dict[str, list[str]] = {}
+    far: dict[str, list[str]] = {}
     for by_bundle in scaled.values():
         for name, (units, label) in by_bundle.items():
             others = [other for one, (other, _) in by_bundle.items() if one != name]
             usual = median(others) if others else units
             if len(others) >= OTHERS and not usual / APART <= units <= usual * APART:
-                found.setdefault(name, []).append(
+                far.setdefault(name, []).append(
                     f"{label}: {units:.3g} times the reference kernel's seconds; on "
                     f"{len(others)} other machines {usual:.3g}"
                 )
-    return found
+    return far
 
 
 def kernel_units(record: Record) -> float | None:

@@ -157,10 +157,10 @@ def _at(path: str) -> Callable[[Record], Any]:
     names = path.split(".")
 
     def of(record: Record) -> Any:
-        found: Any = record
+        value: Any = record
         for name in names:
-            found = None if found is None else getattr(found, name)
-        return found
+            value = None if value is None else getattr(value, name)
+        return value
 
     return of
 
@@ -190,8 +190,8 @@ def _uncounted(record: Record) -> str:
 
 
 def _end(record: Record, which: str) -> float | None:
-    found = seconds_interval(record)
-    return None if found is None else float(getattr(found, which))
+    interval = seconds_interval(record)
+    return None if interval is None else float(getattr(interval, which))
 
 
 def _fastest(record: Record) -> float | None:
@@ -222,8 +222,8 @@ def family_of(record: Record) -> str:
 
 def half_width(record: Record) -> float | None:
     """Return half the width of the 95 % interval of a cell's seconds, in percent of them."""
-    found, seconds = seconds_interval(record), record.outcome.median_seconds
-    return 50 * (found.high - found.low) / seconds if found and seconds else None
+    interval, seconds = seconds_interval(record), record.outcome.median_seconds
+    return 50 * (interval.high - interval.low) / seconds if interval and seconds else None
 
 
 def counted(record: Record) -> LinearAlgebraWork | None:
@@ -235,8 +235,8 @@ def counted(record: Record) -> LinearAlgebraWork | None:
 def _in(scale: float, name: str) -> Callable[[Record], float | None]:
     def of(record: Record) -> float | None:
         work = counted(record)
-        found = getattr(work, name) if work else None
-        return found / scale if found else None
+        amount = getattr(work, name) if work else None
+        return amount / scale if amount else None
 
     return of
 
@@ -246,8 +246,8 @@ def _busy(outcome: Outcome) -> int:
 
 
 def _memory(record: Record) -> float | None:
-    found = record.outcome.memory_increase_bytes
-    return None if found is None else found / MIB
+    increase = record.outcome.memory_increase_bytes
+    return None if increase is None else increase / MIB
 
 
 _SECONDS: Mapping[str, Any] = {"unit": "s", "form": "significant"}
@@ -363,14 +363,14 @@ def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str
     and so is `p`. `ratios` are those to the reference's seconds that decide, one for each round.
     """
     compared = against_reference(records, reference)
-    together = iter(corrected([found for _, found in compared if found is not None]))
-    told = []
-    for record, (base, found) in zip(records, compared, strict=True):
-        cpu = compare_cpu(record, base) if base is not None and found is not None else None
-        both = next(together) if found is not None else None
-        ratios = paired_ratios(record, base) if base is not None and found is not None else []
-        told.append(row(record) | _compared(base, found, both, cpu) | {"ratios": ratios})
-    return told
+    together = iter(corrected([one for _, one in compared if one is not None]))
+    made = []
+    for record, (base, one) in zip(records, compared, strict=True):
+        cpu = compare_cpu(record, base) if base is not None and one is not None else None
+        both = next(together) if one is not None else None
+        ratios = paired_ratios(record, base) if base is not None and one is not None else []
+        made.append(row(record) | _compared(base, one, both, cpu) | {"ratios": ratios})
+    return made
 
 
 def against_reference(
@@ -378,12 +378,12 @@ def against_reference(
 ) -> list[tuple[Record | None, Comparison | None]]:
     """Return the reference and the comparison for each record; None if there is none."""
     known = references(records, reference)
-    told: list[tuple[Record | None, Comparison | None]] = []
+    pairs: list[tuple[Record | None, Comparison | None]] = []
     for record in records:
         base = known.get(circumstances(record.cell))
         other = base is not None and base.cell.algorithm != record.cell.algorithm
-        told.append((base, compare(record, base) if other and base is not None else None))
-    return told
+        pairs.append((base, compare(record, base) if other and base is not None else None))
+    return pairs
 
 
 def _compared(
@@ -416,9 +416,9 @@ def row(record: Record) -> dict[str, Any]:
     holds the figure of each round, `seconds_calls` every timed call by round.
     """
     metrics = record.outcome.metrics
-    found = {
+    entries = {
         column.name: column.of(record)
         for column in EXPORTED
         if column.name in metrics or column.name not in _METRICS
     }
-    return found | metrics
+    return entries | metrics

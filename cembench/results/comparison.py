@@ -79,11 +79,11 @@ def ratio_interval(ratios: Sequence[float], share: float = 1.0) -> Interval | No
 
     `share` is the part of the 5 % error that this interval may use; None for too few figures.
     """
-    found = centre_interval([log(ratio) for ratio in ratios], ERROR * share)
-    if found is None:
+    interval = centre_interval([log(ratio) for ratio in ratios], ERROR * share)
+    if interval is None:
         return None
     middle = _middle(ratios)
-    return Interval(min(exp(found.low), middle), max(exp(found.high), middle))
+    return Interval(min(exp(interval.low), middle), max(exp(interval.high), middle))
 
 
 def seconds_interval(record: Record) -> Interval | None:
@@ -176,13 +176,13 @@ def compare(record: Record, reference: Record) -> Comparison | None:
     if not separate:
         return Comparison(ours / theirs, None, "not side by side", 0)
     share = share_of(len(separate), record.cell, reference.cell)
-    found = disturbance(separate, together, share)
-    if agree(found):
-        return replace(compare_ratios(together, share), together=True, disturbance=found)
+    disturbed = disturbance(separate, together, share)
+    if agree(disturbed):
+        return replace(compare_ratios(together, share), together=True, disturbance=disturbed)
     alone = compare_ratios(separate, share)
-    if found is not None:
+    if disturbed is not None:
         # The verdict must hold either way, and so it errs no more often than that of either.
-        return replace(confirmed(alone, together, share), disturbance=found)
+        return replace(confirmed(alone, together, share), disturbance=disturbed)
     return confirmed(alone, measured_ratios(record, reference), share)
 
 

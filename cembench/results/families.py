@@ -90,8 +90,8 @@ def rate_interval(rounds: Sequence[Sequence[float]], *, log: bool) -> Interval |
     """
     if not rounds or median(map(len, rounds)) < DEFAULT_ROUNDS:
         return None
-    found = average_interval([median(ratios) for ratios in rounds], log=log)
-    return found and Interval(found.low - 1, found.high - 1)
+    interval = average_interval([median(ratios) for ratios in rounds], log=log)
+    return interval and Interval(interval.low - 1, interval.high - 1)
 
 
 def votes(

@@ -45,8 +45,8 @@ def _count(of: pd.Series) -> int:
 
 def _shares(of: pd.Series, families: pd.Series | None) -> list[float]:
     """Return the share of each family; each entry is one of its own if there are none."""
-    found = of if of.dtype == bool else of.notna()
-    return family_means(list(found), list(range(len(found)) if families is None else families))
+    held = of if of.dtype == bool else of.notna()
+    return family_means(list(held), list(range(len(held)) if families is None else families))
 
 
 def _share(of: pd.Series, families: pd.Series | None = None) -> float:
@@ -55,8 +55,8 @@ def _share(of: pd.Series, families: pd.Series | None = None) -> float:
 
 def _share_words(of: pd.Series, families: pd.Series | None = None) -> str:
     shares = _shares(of, families)
-    found = share_interval(float(np.mean(shares)), len(shares))
-    return f"{100 * found.low:.1f} to {100 * found.high:.1f}"
+    interval = share_interval(float(np.mean(shares)), len(shares))
+    return f"{100 * interval.low:.1f} to {100 * interval.high:.1f}"
 
 
 def _family_percentile(of: pd.Series, families: pd.Series, q: float) -> float | None:
@@ -75,8 +75,8 @@ def _at_largest(of: pd.Series, wanted: pd.Series) -> Any:
 
 def commonest(of: pd.Series) -> str:
     """Return the commonest entries of lists with their numbers: "folded 2, timeout 1"."""
-    found = Counter(kind for kinds in of for kind in kinds)
-    named = ", ".join(f"{k.replace('_', ' ')} {n}" for k, n in found.most_common(_NAMED))
+    counts = Counter(kind for kinds in of for kind in kinds)
+    named = ", ".join(f"{k.replace('_', ' ')} {n}" for k, n in counts.most_common(_NAMED))
     return named or "none"
 
 
@@ -86,8 +86,8 @@ def listed(before: str, texts: Iterable[object], after: str = "", between: str =
     >>> listed("; not on ", ["a", "b"], between=", ")
     '; not on a, b'
     """
-    found = between.join(map(str, texts))
-    return f"{before}{found}{after}" if found else ""
+    joined = between.join(map(str, texts))
+    return f"{before}{joined}{after}" if joined else ""
 
 
 def _corrected(of: pd.Series) -> pd.Series:
@@ -107,8 +107,8 @@ def _family_geometric(of: pd.Series, families: pd.Series) -> float:
 
 
 def _family_interval(of: pd.Series, families: pd.Series) -> str | None:
-    found = average_interval(list(of), list(families))
-    return f"{found.low:.2f} to {found.high:.2f}" if found else None
+    interval = average_interval(list(of), list(families))
+    return f"{interval.low:.2f} to {interval.high:.2f}" if interval else None
 
 
 def _percentile(known: Any, q: float) -> float:

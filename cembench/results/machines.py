@@ -69,13 +69,13 @@ def marks(records: Iterable[Record], environments: Environments) -> Marks:
     []
 
     """
-    told = list(records)
-    counts = Counter(machine_of_record(record, environments) for record in told)
+    chosen = list(records)
+    counts = Counter(machine_of_record(record, environments) for record in chosen)
     if len(counts) < 2:
         return Marks({}, counts, {})
     ordered = [name for name, _ in counts.most_common()]
     letters = {name: _letter(k) for k, name in enumerate(ordered)}
-    used = {record.environment for record in told}
+    used = {record.environment for record in chosen}
     by = {key: letters[machine_of(environments.get(key, {}))] for key in used}
     return Marks(letters, counts, by)
 
@@ -91,13 +91,13 @@ def software_differences(records: Sequence[Record], environments: Environments) 
     if len(counts) < 2:
         return []
     first, *others = [key for key, _ in counts.most_common()]
-    told = []
+    sentences = []
     for key in others:
         base, other = environments.get(first, {}), environments.get(key, {})
-        found = differences(base, other)
-        if found:
-            told.append(f"{machine_of(other) or key}: {'; '.join(found)}")
-    return list(dict.fromkeys(told))
+        changed = differences(base, other)
+        if changed:
+            sentences.append(f"{machine_of(other) or key}: {'; '.join(changed)}")
+    return list(dict.fromkeys(sentences))
 
 
 #: The facts of an environment that are the software's. What BLAS was loaded is not among them: a
@@ -118,17 +118,17 @@ def differences(
     >>> differences({"python": "3.11.2"}, {"python": "3.12.1"})
     ['python: 3.11.2 / 3.12.1']
     """
-    found = []
+    changed = []
     for name in facts:
         mine, other = ours.get(name), theirs.get(name)
         older = [{} if fact is None else fact for fact in (mine, other)]  # some facts are lacking
         if mine != other and all(isinstance(fact, Mapping) for fact in older):
             mine, other = older
-            found += [
+            changed += [
                 f"{part}: {mine.get(part)} / {other.get(part)}"
                 for part in sorted({*mine, *other})
                 if mine.get(part) != other.get(part)
             ]
         elif mine != other:
-            found.append(f"{name}: {mine} / {other}")
-    return found
+            changed.append(f"{name}: {mine} / {other}")
+    return changed

@@ -46,11 +46,11 @@ class Conflict:
     same_map: bool | None
 
     def __str__(self) -> str:
-        told = ", ".join(
+        shown = ", ".join(
             f"{name or 'not named'} {status}{'' if s is None else f' {s:.3g} s'}"
             for name, status, s in zip(self.machines, self.statuses, self.seconds, strict=True)
         )
-        return f"{self.cell}: {told}{'; other maps' if self.same_map is False else ''}"
+        return f"{self.cell}: {shown}{'; other maps' if self.same_map is False else ''}"
 
 
 @dataclass(frozen=True)
@@ -68,12 +68,12 @@ def merge(runs: Iterable[Store], into: Store) -> Merged:
     that did not, and then the later one. Of several machines the one counts that has more cells of
     the surface ok, and then the later one.
     """
-    found = [(run, run.records(), run.environments()) for run in runs]
+    read = [(run, run.records(), run.environments()) for run in runs]
     with into.locked():
-        given = [*found, (into, into.finished(), into.environments())]
+        every = [*read, (into, into.finished(), into.environments())]
         for one in others_of(into):
-            given.append((one, one.finished(), one.environments()))
-        best = _best(given)
+            every.append((one, one.finished(), one.environments()))
+        best = _best(every)
         cells: dict[str, dict[str, Held]] = defaultdict(dict)
         for (key, machine), held in best.items():
             cells[key][machine] = held
@@ -101,10 +101,10 @@ def others_of(run: Store) -> list[Store]:
         One of them is a link.
 
     """
-    found = files_in(run.folder / "others", "*", run.folder)
-    for folder in found:
+    files = files_in(run.folder / "others", "*", run.folder)
+    for folder in files:
         check_no_link(folder, run.folder)
-    return [Store(folder) for folder in found if folder.is_dir()]
+    return [Store(folder) for folder in files if folder.is_dir()]
 
 
 def _beside(into: Store, machine: str) -> Store:

@@ -33,12 +33,12 @@ def holm(chances: Sequence[float]) -> list[float]:
     [0.03, 0.06, 0.06]
 
     """
-    found = [0.0] * len(chances)
+    adjusted = [0.0] * len(chances)
     so_far = 0.0
     for k, place in enumerate(sorted(range(len(chances)), key=lambda i: chances[i])):
         so_far = max(so_far, min(1.0, (len(chances) - k) * chances[place]))
-        found[place] = so_far
-    return found
+        adjusted[place] = so_far
+    return adjusted
 
 
 def corrected(found: Sequence[Comparison]) -> list[Comparison]:
@@ -52,12 +52,12 @@ def corrected(found: Sequence[Comparison]) -> list[Comparison]:
     if len(tested) < 2:
         return list(found)
     chances = iter(holm(tested))
-    told = []
+    verdicts = []
     for one in found:
         p = next(chances) if one.interval is not None else 1.0
         lost = p > ERROR and one.verdict in ("faster", "slower")
-        told.append(replace(one, p=p, verdict="undecided") if lost else replace(one, p=p))
-    return told
+        verdicts.append(replace(one, p=p, verdict="undecided") if lost else replace(one, p=p))
+    return verdicts
 
 
 def sign_test(wins: int, losses: int) -> float:

@@ -279,8 +279,8 @@ class Paper(_Part):
 
     def count(self, model: str, what: Literal["vertices", "faces"]) -> int:
         """Return the number of vertices or triangles of a model; 0 if no table has it."""
-        found = (rows.get(model, {}).get(what) for rows in self.tables.values())
-        return int(next((number for number in found if number is not None), 0))
+        counts = (rows.get(model, {}).get(what) for rows in self.tables.values())
+        return int(next((number for number in counts if number is not None), 0))
 
     def faces(self, model: str) -> int:
         """Return the number of triangles of a model."""
@@ -487,25 +487,25 @@ def _unknown(name: str, allowed: Iterable[str]) -> str:
 
 def _entries(file: Path, read: Mapping[str, Any], name: str) -> list[dict[str, Any]]:
     """Return the tables ``[[name]]`` of a file."""
-    found = read.get(name, [])
-    if not isinstance(found, list) or not all(isinstance(one, dict) for one in found):
+    entries = read.get(name, [])
+    if not isinstance(entries, list) or not all(isinstance(one, dict) for one in entries):
         raise _wrong(file, name, f"write each as a table [[{name}]]")
-    return found
+    return entries
 
 
 def _read_table(file: Path) -> dict[str, dict[str, str | None]]:
     """Return the rows of a CSV file by its first column; empty cells are None."""
     lines = list(csv.reader(_read_text(file).splitlines()))
     header, *rows = lines or [[]]
-    found: dict[str, dict[str, str | None]] = {}
+    table: dict[str, dict[str, str | None]] = {}
     for k, row in enumerate(rows, 2):
         if len(row) != len(header):
             raise _wrong(file, f"line {k}", f"{len(row)} cells, under {len(header)} headings")
-        if row[0] in found:
+        if row[0] in table:
             raise _wrong(file, f"line {k}", f"the model {row[0]!r} occurs twice")
         cells = zip(header[1:], row[1:], strict=True)
-        found[row[0]] = {column: cell or None for column, cell in cells}
-    return found
+        table[row[0]] = {column: cell or None for column, cell in cells}
+    return table
 
 
 def _spelled_out(

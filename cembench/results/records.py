@@ -388,8 +388,8 @@ class Outcome(BaseModel):
     @property
     def folded_before_repair(self) -> int | None:
         """Folded triangles of the method's own map, before any repair; None if it counts none."""
-        told = self.extras.get("folded_before_repair")
-        return told if type(told) is int else None
+        folded = self.extras.get("folded_before_repair")
+        return folded if type(folded) is int else None
 
     @property
     def solve_seconds(self) -> float | None:

@@ -52,9 +52,9 @@ def _change(before: Record, after: Record) -> Change:
     ours, theirs = (_logs(rounds, corrected=drift is not None) for rounds in (new, old))
     ratio = exp(median(ours) - median(theirs))
     share = min(share_of(len(new), after.cell), share_of(len(old), before.cell))
-    found = shift_interval(ours, theirs, ERROR * share)
+    shift = shift_interval(ours, theirs, ERROR * share)
     interval = (
-        None if found is None else Interval(min(exp(found.low), ratio), max(exp(found.high), ratio))
+        None if shift is None else Interval(min(exp(shift.low), ratio), max(exp(shift.high), ratio))
     )
     p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / share)
     rounds = min(len(new), len(old))

@@ -67,8 +67,8 @@ class Samples:
 
     def rounds(self) -> dict[int, Round]:
         """Return the saved rounds by number, in order."""
-        found = {e.number: e.round for e in self._entries() if e.number is not None and e.round}
-        return {number: found[number] for number in sorted(found)}
+        by_number = {e.number: e.round for e in self._entries() if e.number is not None and e.round}
+        return {number: by_number[number] for number in sorted(by_number)}
 
     @property
     def _run(self) -> Path:

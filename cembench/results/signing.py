@@ -54,13 +54,13 @@ def signature_of(files: Mapping[str, bytes], key: Path) -> bytes:
 
 
 def _signature(message: bytes, key: Path) -> bytes:
-    found = _ssh_keygen(["sign", "-f", str(key)], message)
-    if found is None:
+    signed = _ssh_keygen(["sign", "-f", str(key)], message)
+    if signed is None:
         raise ParameterError(
             f"ssh-keygen does not sign with {key}. Name a private key, as ~/.ssh/id_ed25519, or "
             "the public key of one that your agent holds."
         )
-    return found
+    return signed
 
 
 def _message(hashes: Iterable[tuple[str, str]]) -> bytes:
@@ -92,12 +92,12 @@ def signer(run: Path, allowed: Path) -> str:
     if not is_there(path):
         raise RecordError(f"{run} is not signed; its measurer can run `cembench sign {run}`.")
     read_bytes(path, run)  # a regular file, and no link
-    given = ["-f", str(allowed), "-s", str(path)]
-    names = _ssh_keygen(["find-principals", *given], b"")
+    arguments = ["-f", str(allowed), "-s", str(path)]
+    names = _ssh_keygen(["find-principals", *arguments], b"")
     if names is None:
         raise RecordError(f"{run} is signed by nobody whom {allowed} names.")
     name = names.decode(errors="replace").splitlines()[0]
-    if _ssh_keygen(["verify", *given, "-I", name], contents) is None:
+    if _ssh_keygen(["verify", *arguments, "-I", name], contents) is None:
         raise RecordError(
             f"{run} was changed after {name} signed it, or the signature is of something else. Get "
             "the run anew, or have it signed again."
@@ -108,12 +108,12 @@ def signer(run: Path, allowed: Path) -> str:
 def _contents(run: Path) -> bytes:
     """Return what is signed: the names and hashes of a run's files."""
     Store(run).check_is_run()
-    found = []
+    lines = []
     for path in _files(run):
         with os.fdopen(open_file(path, run), "rb") as file:
             hashed = hashlib.file_digest(file, "sha256").hexdigest()
-        found.append((path.relative_to(run).as_posix(), hashed))
-    return _message(found)
+        lines.append((path.relative_to(run).as_posix(), hashed))
+    return _message(lines)
 
 
 def _files(run: Path) -> Iterator[Path]:

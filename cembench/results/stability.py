@@ -62,17 +62,17 @@ def outliers(records: Iterable[Record]) -> list[Outlier]:
     for record in records:
         angle = record.outcome.metrics.get("angle_error_mean_deg")
         if record.target == "disk" and angle is not None:
-            here = by_surface.setdefault(record.cell.mesh_hash, {})
-            here.setdefault(record.cell.algorithm, []).append((float(angle), record))
-    found = []
-    for here in by_surface.values():
-        usual = {name: median(angle for angle, _ in maps) for name, maps in here.items()}
-        for name, maps in here.items():
+            of_surface = by_surface.setdefault(record.cell.mesh_hash, {})
+            of_surface.setdefault(record.cell.algorithm, []).append((float(angle), record))
+    suspects = []
+    for of_surface in by_surface.values():
+        usual = {name: median(angle for angle, _ in maps) for name, maps in of_surface.items()}
+        for name, maps in of_surface.items():
             others = [angle for other, angle in usual.items() if other != name]
             worst, record = max(maps, key=lambda one: one[0])
             if len(others) >= FEWEST and worst >= DEGREES and worst > TIMES * median(others):
-                found.append(Outlier(record, worst, median(others)))
-    return sorted(found, key=lambda one: -one.times)
+                suspects.append(Outlier(record, worst, median(others)))
+    return sorted(suspects, key=lambda one: -one.times)
 
 
 def outlier_lines(records: Iterable[Record]) -> list[str]:
@@ -81,8 +81,8 @@ def outlier_lines(records: Iterable[Record]) -> list[str]:
     Algorithms that do not promise conformal maps come last, and say so. Those beyond
     :data:`LISTED` are counted.
     """
-    found = sorted(outliers(records), key=lambda one: one.record.cell.algorithm)
-    grouped = [list(g) for _, g in groupby(found, key=lambda one: one.record.cell.algorithm)]
+    suspects = sorted(outliers(records), key=lambda one: one.record.cell.algorithm)
+    grouped = [list(g) for _, g in groupby(suspects, key=lambda one: one.record.cell.algorithm)]
     ordered = sorted(grouped, key=lambda maps: (not _is_conformal(maps[0]), -maps[0].times))
     left = sum(map(len, ordered[LISTED:]))
     return [
@@ -138,19 +138,19 @@ def stability_words(records: Sequence[Record]) -> str:
         most = max(len(r.outcome.rounds) for r in timed)
         times = "once" if most == 1 else f"at most {most} times"
         return f"Each cell was timed {times}, so no intervals are given: {_why(without)}."
-    told = (
+    sentence = (
         f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
         f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "
         f"{UNSTABLE_WIDTH:.0%} of the figure)"
     )
     if unstable:
-        told += f": {_why(unstable)}"
+        sentence += f": {_why(unstable)}"
         busy = sum(_is_beside_work(r) for r in unstable)
-        told += f"; {busy} of them measured beside other work" if busy else ""
+        sentence += f"; {busy} of them measured beside other work" if busy else ""
     if without:
         has = "has" if len(without) == 1 else "have"
-        told += f". {len(without)} {has} too few rounds for an interval: {_why(without)}"
-    return f"{told}."
+        sentence += f". {len(without)} {has} too few rounds for an interval: {_why(without)}"
+    return f"{sentence}."
 
 
 def scatter_words(records: Sequence[Record]) -> str:
@@ -162,23 +162,25 @@ def scatter_words(records: Sequence[Record]) -> str:
     separate, within, widths = [], [], []
     for ours, theirs in _compared(records):
         apart, together = both_ratios(ours.outcome.rounds, theirs.outcome.rounds)
-        found = compare(ours, theirs)
-        if len(apart) < 2 or found is None:
+        comparison = compare(ours, theirs)
+        if len(apart) < 2 or comparison is None:
             continue
         separate.append(_scatter(apart))
         within += [_scatter(together)] if together else []
-        if found.interval is not None:
-            widths.append((found.interval.high - found.interval.low) / found.ratio)
+        if comparison.interval is not None:
+            widths.append((comparison.interval.high - comparison.interval.low) / comparison.ratio)
     if not separate:
         return ""
-    told = f"Ratios of two algorithms scatter by {median(separate):.1%} from round to round"
+    sentence = f"Ratios of two algorithms scatter by {median(separate):.1%} from round to round"
     if within:
-        told += f" between processes and by {median(within):.1%} within one process"
-    told += f" (medians over {len(separate)} pairs)"
+        sentence += f" between processes and by {median(within):.1%} within one process"
+    sentence += f" (medians over {len(separate)} pairs)"
     if widths:
         unstable = sum(width > UNSTABLE_WIDTH for width in widths)
-        told += f"; {unstable} of {len(widths)} have an interval wider than {UNSTABLE_WIDTH:.0%}"
-    return f"{told}."
+        sentence += (
+            f"; {unstable} of {len(widths)} have an interval wider than {UNSTABLE_WIDTH:.0%}"
+        )
+    return f"{sentence}."
 
 
 def _compared(records: Sequence[Record]) -> Iterator[tuple[Record, Record]]:

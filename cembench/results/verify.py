@@ -217,14 +217,14 @@ def different_metrics(
         "overlap_share": ROUNDING,
     }
     differing = []
-    for name, found in computed.items():
+    for name, recomputed in computed.items():
         if name not in recorded:
             continue
         held = inf if (value := recorded[name]) is None else value
-        if held != found and not abs(held - found) <= max(
-            bounds.get(name, 0.0), ROUNDING * abs(found)
+        if held != recomputed and not abs(held - recomputed) <= max(
+            bounds.get(name, 0.0), ROUNDING * abs(recomputed)
         ):
-            differing.append(f"{name} {found:.10g}, recorded {held:.10g}")
+            differing.append(f"{name} {recomputed:.10g}, recorded {held:.10g}")
     return differing
 
 

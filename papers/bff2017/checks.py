@@ -18,21 +18,21 @@ def amortised(
     seconds: pd.Series, phases: pd.Series, algorithm: pd.Series, place: pd.Series
 ) -> dict[str, float]:
     """Return the seconds of CETM over those of BFF's repeated phases, by the surface's number."""
-    found = {}
+    by_surface = {}
     for surface in sorted(set(place)):
-        here = place == surface
-        others, own = seconds[here & (algorithm == "cetm")], phases[here & (algorithm == "bff")]
+        rows = place == surface
+        others, own = seconds[rows & (algorithm == "cetm")], phases[rows & (algorithm == "bff")]
         again = [sum(spent.get(name, 0.0) for name in AGAIN) for spent in own if spent]
         if len(others) and again and again[0] > 0:
-            found[str(surface + 1)] = float(others.iloc[0]) / again[0]
-    return found
+            by_surface[str(surface + 1)] = float(others.iloc[0]) / again[0]
+    return by_surface
 
 
-def middle(found: Mapping[str, float]) -> float:
+def middle(ratios: Mapping[str, float]) -> float:
     """Return the median."""
-    return float(np.median([*found.values()]))
+    return float(np.median([*ratios.values()]))
 
 
-def as_words(found: Mapping[str, float]) -> str:
+def as_words(ratios: Mapping[str, float]) -> str:
     """Return the ratios with the surfaces' numbers in the report."""
-    return ", ".join(f"{ratio:.0f} (surface {surface})" for surface, ratio in found.items())
+    return ", ".join(f"{ratio:.0f} (surface {surface})" for surface, ratio in ratios.items())

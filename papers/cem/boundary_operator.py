@@ -244,7 +244,7 @@ def statements(
     """
     values, vectors = K.leading_eigenpairs()
     ones = np.ones(K.size)
-    found = [
+    tested = [
         _within("K 1 = 1", "Theorem 2", np.abs(K(ones) - 1).max(), "largest error of a row sum"),
         _within("spectral radius is 1", "Theorem 2, Eq. 31", abs(values[0] - 1), "its error"),
         Check(
@@ -272,10 +272,10 @@ def statements(
         ),
     ]
     if dense:
-        found += _dense_statements(K, values)
+        tested += _dense_statements(K, values)
     for which, path in (("23", plain), ("30", inverse)):
-        found += _trajectory_statements(which, path)
-    return found
+        tested += _trajectory_statements(which, path)
+    return tested
 
 
 def _within(name: str, source: str, error: float, meaning: str) -> Check:

@@ -138,9 +138,9 @@ def spectrum(K: NDArray[np.float64]) -> tuple[float, float, float]:
     return float(K.min()), float(moduli[-1]), float(moduli[-2])
 
 
-def like_corollary_1(found: tuple[float, float, float]) -> bool:
+def like_corollary_1(tested: tuple[float, float, float]) -> bool:
     """Whether a matrix with this spectrum is positive, and 1 its simple, largest eigenvalue."""
-    least, first, second = found
+    least, first, second = tested
     return least > 0 and abs(first - 1) < 1e-9 and second < 1
 
 
@@ -156,8 +156,10 @@ def largest_escape(K: NDArray[np.float64], sets: int = 100) -> float:
     images = K @ points
     # A point is in the hull if it is not farther out than the points in any direction.
     turns = np.exp(-1j * np.linspace(0, 2 * np.pi, 64, endpoint=False))
-    found = ((turn * images).real.max(axis=0) - (turn * points).real.max(axis=0) for turn in turns)
-    return float(max(escape.max() for escape in found))
+    escapes = (
+        (turn * images).real.max(axis=0) - (turn * points).real.max(axis=0) for turn in turns
+    )
+    return float(max(escape.max() for escape in escapes))
 
 
 def spectra_by_weight(mesh: TriangleMesh) -> tuple[tuple[float, float, float], ...] | None:
@@ -208,8 +210,8 @@ def disagreeing_rates(
             tested += 1
             low, high = (other - 0.005) / (ours + 0.005), (other + 0.005) / (ours - 0.005)
             if not low - 1.005 <= printed <= high - 0.995:
-                told = f"{printed}, by Table 1 {other / ours - 1:.2f}"
-                odd.append(f"{model} / {algorithm.upper()}: {told}")
+                cases = f"{printed}, by Table 1 {other / ours - 1:.2f}"
+                odd.append(f"{model} / {algorithm.upper()}: {cases}")
     return tested, odd
 
 

@@ -122,11 +122,13 @@ def holes(
     ]
     command = exhibits.command("holes", surface, mesh.name, outer=outer, sweeps=sweeps, faces=faces)
     with reporter.busy(f"Koebe's method on {mesh.name}") as tell:
-        found = examine_holes(mesh, algorithms, outer, sweeps, folder, command, reporter.warn, tell)
+        examined = examine_holes(
+            mesh, algorithms, outer, sweeps, folder, command, reporter.warn, tell
+        )
     if folder is not None:
-        for exhibit in shown([found], command):
+        for exhibit in shown([examined], command):
             exhibits.write_exhibit(folder, exhibit)
-    return found
+    return examined
 
 
 # For the command line
@@ -142,22 +144,22 @@ def loaded(surface: SurfaceInput, *, faces: int | None, outer: int | None, **_: 
     return mesh
 
 
-def shown(found: Sequence[HoledMaps], command: str) -> list[Exhibit]:
+def shown(examined: Sequence[HoledMaps], command: str) -> list[Exhibit]:
     """Return a table of the figures of all surfaces as an exhibit, which `command` makes."""
     from .holes_exhibits import holes_table
 
-    return [holes_table(facts(found), command)]
+    return [holes_table(facts(examined), command)]
 
 
-def facts(found: Sequence[HoledMaps]) -> list[Any]:
+def facts(examined: Sequence[HoledMaps]) -> list[Any]:
     """Return the figures of all maps as plain data."""
-    return [row for one in found for row in one.rows]
+    return [row for one in examined for row in one.rows]
 
 
-def failures(found: Sequence[HoledMaps]) -> list[str]:
+def failures(examined: Sequence[HoledMaps]) -> list[str]:
     """Return which maps are not valid, and why."""
     return [
         f"{row['mesh']} / {row['algorithm']}: {row['status']}: {row['cause']}"
-        for row in facts(found)
+        for row in facts(examined)
         if row["status"] != "ok"
     ]

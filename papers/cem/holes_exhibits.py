@@ -96,8 +96,8 @@ def _measured(
 ) -> tuple[dict[str, Any], Record, Any]:
     """Return a row for one checked call in its own process."""
     known = {parameter.name for parameter in algorithm.parameters}
-    given = {"outer": outer, "sweeps": sweeps}
-    parameters = {k: v for k, v in given.items() if v is not None and k in known}
+    arguments = {"outer": outer, "sweeps": sweeps}
+    parameters = {k: v for k, v in arguments.items() if v is not None and k in known}
     task = plan_cells([algorithm], [mesh], parameters, MeasurementSettings(repeats=1))[0]
     record, uv = map_once(task, Options())
     outcome = record.outcome

@@ -81,13 +81,13 @@ def theory(
     with reporter.busy(f"Section 4 on {mesh.name}"):
         if run is not None:  # fail now, not after the computation
             exhibits.exhibit_folder(Path(run), exhibit_name(mesh.name))
-        found = theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
+        facts_of_disk = theory_facts(mesh, load_registry().algorithms.get(RIVAL), iterations)
         if run is not None:
             command = exhibits.command(
                 "theory", surface, mesh.name, iterations=iterations, faces=faces
             )
-            add_exhibit(Path(run), found, command)
-    return found
+            add_exhibit(Path(run), facts_of_disk, command)
+    return facts_of_disk
 
 
 # For the command line
@@ -101,22 +101,22 @@ def loaded(surface: SurfaceInput, *, faces: int | None, **_: Any) -> DiskMesh:
     return load_surface(surface, (DiskMesh,), faces=faces)
 
 
-def shown(found: Sequence[TheoryFacts], command: str) -> list[Exhibit]:
+def shown(facts_of_disk: Sequence[TheoryFacts], command: str) -> list[Exhibit]:
     """Return the exhibits of surfaces, which `command` makes."""
     from .theory_exhibit import theory_exhibit
 
-    return [theory_exhibit(one, command) for one in found]
+    return [theory_exhibit(one, command) for one in facts_of_disk]
 
 
-def facts(found: Sequence[TheoryFacts]) -> list[Any]:
+def facts(facts_of_disk: Sequence[TheoryFacts]) -> list[Any]:
     """Return the results as plain data."""
-    return [one.facts for one in found]
+    return [one.facts for one in facts_of_disk]
 
 
-def failures(found: Sequence[TheoryFacts]) -> list[str]:
+def failures(facts_of_disk: Sequence[TheoryFacts]) -> list[str]:
     """Return the surfaces where a statement fails although all premises hold."""
     return [
         f"{one.facts['mesh']}: a statement fails although all premises hold"
-        for one in found
+        for one in facts_of_disk
         if one.facts["premises_hold"] and not one.facts["statements_hold"]
     ]

@@ -40,20 +40,21 @@ def exhibit_name(surface: str) -> str:
     return f"theory-{surface}"
 
 
-def add_exhibit(run: Path, found: TheoryFacts, command: str) -> None:
+def add_exhibit(run: Path, of_disk: TheoryFacts, command: str) -> None:
     """Add the exhibit of what was found to a run; `command` is the one that makes it again."""
-    exhibit = theory_exhibit(found, command)
-    _write_plots(place_of(run, exhibit.name, PICTURE), found)
+    exhibit = theory_exhibit(of_disk, command)
+    _write_plots(place_of(run, exhibit.name, PICTURE), of_disk)
     write_exhibit(run, exhibit)
 
 
-def theory_exhibit(found: TheoryFacts, command: str) -> Exhibit:
+def theory_exhibit(of_disk: TheoryFacts, command: str) -> Exhibit:
     """Return what was found as an exhibit: a summary, tables, and the name of a picture."""
-    facts = dict(found.facts)
+    facts = dict(of_disk.facts)
     return Exhibit(
         name=exhibit_name(facts["mesh"]),
         title=f"Section 4 on {facts['mesh']}",
-        text=f"{_size(facts)}. {_summary(facts)}" + (f" {found.missing}" if found.missing else ""),
+        text=f"{_size(facts)}. {_summary(facts)}"
+        + (f" {of_disk.missing}" if of_disk.missing else ""),
         command=command,
         origin="surface",
         pictures=(
@@ -103,38 +104,38 @@ def _tables(facts: dict[str, Any]) -> Iterator[ExhibitTable]:
     yield _certificate_table(facts["certificate"])
 
 
-def _certificate_table(found: dict[str, Any]) -> ExhibitTable:
+def _certificate_table(of_disk: dict[str, Any]) -> ExhibitTable:
     title = "Modulus of the surface with four boundary points"
     columns = ("four boundary points", "modulus", "off by")
-    if "missing" in found:
-        return ExhibitTable(title=title, columns=columns, rows=(), notes=(found["missing"],))
-    modulus = found["modulus"]
+    if "missing" in of_disk:
+        return ExhibitTable(title=title, columns=columns, rows=(), notes=(of_disk["missing"],))
+    modulus = of_disk["modulus"]
     return ExhibitTable(
         title=title,
         columns=columns,
         rows=(
-            ("surface, at least", found["lower"], None),
-            ("surface, at most", found["upper"], None),
-            ("middle of both", modulus, found["reciprocal_error"]),
+            ("surface, at least", of_disk["lower"], None),
+            ("surface, at most", of_disk["upper"], None),
+            ("middle of both", modulus, of_disk["reciprocal_error"]),
             *(
                 (name, None if off is None else modulus * (1 + off), off)
-                for name, off in found["off"].items()
+                for name, off in of_disk["off"].items()
             ),
         ),
         forms={"modulus": ".5f", "off by": "+.1e"},
     )
 
 
-def _write_plots(path: Path, found: TheoryFacts) -> None:
+def _write_plots(path: Path, of_disk: TheoryFacts) -> None:
     """Draw the spectrum of K, the energies by iteration, and the step lengths as a PNG file."""
-    facts = found.facts
+    facts = of_disk.facts
     figure = Figure(figsize=(13, 4.2), dpi=120, layout="constrained")
     FigureCanvasAgg(figure)
     figure.suptitle(f"{facts['mesh']}: {_size(facts)}", fontweight="bold")
     spectrum, energy, steps = figure.subplots(1, 3)
-    _draw_spectrum(spectrum, np.asarray(found.spectrum))
-    _draw_energies(energy, found.trajectories, found.others)
-    _draw_steps(steps, found.trajectories, facts["rate_predicted"])
+    _draw_spectrum(spectrum, np.asarray(of_disk.spectrum))
+    _draw_energies(energy, of_disk.trajectories, of_disk.others)
+    _draw_steps(steps, of_disk.trajectories, facts["rate_predicted"])
     write(path, lambda file: figure.savefig(file, format="png"))
 
 

@@ -73,7 +73,7 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
         "CEM, step (30)": trajectory(K, iterations, inversion=True),
     }
     plain, inverse = paths.values()
-    given, said = premises(K), statements(K, plain, inverse, dense=dense)
+    assumed, said = premises(K), statements(K, plain, inverse, dense=dense)
     leading, _ = K.leading_eigenpairs()
     others, missing = _rival_history(rival, mesh)
     rate = predicted_rate(leading)
@@ -81,10 +81,10 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
         "mesh": mesh.name,
         "vertices": mesh.n,
         "boundary_vertices": K.size,
-        "premises_hold": all(check.holds for check in given),
+        "premises_hold": all(check.holds for check in assumed),
         # Statements that the paper does not claim are not counted.
         "statements_hold": all(c.holds for c in said if c.source != "not claimed"),
-        "premises": [asdict(check) for check in given],
+        "premises": [asdict(check) for check in assumed],
         "statements": [asdict(check) for check in said],
         "eigenvalues": leading.tolist(),
         "gap": float(1 - leading[1]),
@@ -97,24 +97,24 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
         "certificate": _certificate(mesh, paths, K.start()),
     }
     spectrum = (K.spectrum() if dense else leading).tolist()
-    return TheoryFacts(facts, tuple(given), tuple(said), paths, others, spectrum, missing)
+    return TheoryFacts(facts, tuple(assumed), tuple(said), paths, others, spectrum, missing)
 
 
 def _certificate(mesh: DiskMesh, paths: Mapping[str, Trajectory], start: Any) -> dict[str, Any]:
     """Return the modulus of the surface with four boundary points, and the errors of CEM's maps."""
     try:
-        found = certify(mesh)
+        certificate = certify(mesh)
     except AlgorithmFailed as error:
         return {"missing": str(error)}
-    place = [int(np.flatnonzero(mesh.boundary == corner)[0]) for corner in found.corners]
+    place = [int(np.flatnonzero(mesh.boundary == corner)[0]) for corner in certificate.corners]
     ends = {"CEM, start": start} | {name: path.boundary for name, path in paths.items()}
-    off = {name: found.off(z[place]) for name, z in ends.items()}
+    off = {name: certificate.off(z[place]) for name, z in ends.items()}
     return {
-        "corners": found.corners.tolist(),
-        "lower": found.lower,
-        "upper": found.upper,
-        "modulus": found.modulus,
-        "reciprocal_error": found.reciprocal_error,
+        "corners": certificate.corners.tolist(),
+        "lower": certificate.lower,
+        "upper": certificate.upper,
+        "modulus": certificate.modulus,
+        "reciprocal_error": certificate.reciprocal_error,
         "off": {name: value if np.isfinite(value) else None for name, value in off.items()},
     }
 

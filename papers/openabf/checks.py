@@ -21,34 +21,36 @@ def ratios(table: Mapping[str, Row], column: str, base: str) -> dict[str, float]
     return {model: round(over[model] / under[model], 2) for model in over if model in under}
 
 
-def count_within(found: Mapping[str, float], low: float, high: float) -> int:
+def count_within(figures: Mapping[str, float], low: float, high: float) -> int:
     """Return how many figures are between two, inclusive."""
-    return sum(low <= figure <= high for figure in found.values())
+    return sum(low <= figure <= high for figure in figures.values())
 
 
-def agreeing(found: Mapping[str, float], table: Mapping[str, Row], column: str, near: float) -> int:
+def agreeing(
+    figures: Mapping[str, float], table: Mapping[str, Row], column: str, near: float
+) -> int:
     """Return how many figures are within `near` of the printed ones of a column."""
     printed = _cells(table, column)
-    return sum(abs(figure - printed[model]) <= near for model, figure in found.items())
+    return sum(abs(figure - printed[model]) <= near for model, figure in figures.items())
 
 
-def as_words(found: Mapping[str, float]) -> str:
+def as_words(figures: Mapping[str, float]) -> str:
     """Return figures with their models."""
-    return ", ".join(f"{model} {figure:g}" for model, figure in found.items())
+    return ", ".join(f"{model} {figure:g}" for model, figure in figures.items())
 
 
 def slower(table: Mapping[str, Row], base: str, others: Sequence[str]) -> tuple[int, int]:
     """Return how many cells of the other columns exceed the base's, and how many there are."""
-    found = [ratio for column in others for ratio in ratios(table, column, base).values()]
-    return sum(ratio > 1 for ratio in found), len(found)
+    slowdowns = [ratio for column in others for ratio in ratios(table, column, base).values()]
+    return sum(ratio > 1 for ratio in slowdowns), len(slowdowns)
 
 
 def exponents(table: Mapping[str, Row], columns: Sequence[str]) -> str:
     """Return the slopes of log seconds over log triangles, as words."""
-    told = []
+    fitted = []
     for column in columns:
         seconds = _cells(table, column)
         faces = [float(table[model]["faces"] or 0) for model in seconds]
         slope = np.polyfit(np.log(faces), np.log([*seconds.values()]), 1)[0]
-        told.append(f"{column} {slope:.2f}")
-    return ", ".join(told)
+        fitted.append(f"{column} {slope:.2f}")
+    return ", ".join(fitted)

@@ -51,11 +51,11 @@ def sphere(faces: Annotated[int, Field(ge=24)] = 50_000) -> DiskMesh:
     V = np.stack(
         [np.sin(polar) * np.cos(around), np.sin(polar) * np.sin(around), np.cos(polar)], axis=1
     )
-    here = np.arange(sectors)
-    after = (here + 1) % sectors
+    start = np.arange(sectors)
+    after = (start + 1) % sectors
     inner = (1 + np.arange(rings - 1) * sectors)[:, None]
-    a, b = (inner + here).ravel(), (inner + after).ravel()
+    a, b = (inner + start).ravel(), (inner + after).ravel()
     bands = np.stack([a, a + sectors, b, b, a + sectors, b + sectors], axis=1).reshape(-1, 3)
-    fan = np.stack([np.zeros(sectors, dtype=np.int64), 1 + here, 1 + after], axis=1)
+    fan = np.stack([np.zeros(sectors, dtype=np.int64), 1 + start, 1 + after], axis=1)
     V = np.concatenate([[[0.0, 0.0, 1.0]], V])
     return DiskMesh.from_arrays(V, np.concatenate([fan, bands]), name="openabf-sphere")

@@ -93,7 +93,7 @@ def facets_of(records: Rows) -> Facets:
         for k, columns in enumerate(FACETS.values()):
             for name in filter(None, (printed[key][k], *map(row.get, columns))):
                 meant.setdefault(str(name), set()).add((k, cells[key][k]))
-    names = {name: found.pop() for name, found in meant.items() if len(found) == 1}
+    names = {name: titles.pop() for name, titles in meant.items() if len(titles) == 1}
     return Facets(dict(zip(FACETS, choices, strict=True)), names, cells)
 
 
@@ -171,7 +171,7 @@ def render(report: Report, folder: Path) -> str:
             report=report,
             sections=sections,
             pages=_in_order([s for s in everything if s["section"].page]),
-            facets={name: found for name, found in facets.choices.items() if len(found) > 1},
+            facets={name: options for name, options in facets.choices.items() if len(options) > 1},
             keys=keys,
             anchor=anchors.of,
             table=lambda table: _table(table, keys, anchors.of(table)),
@@ -265,11 +265,11 @@ def _table(table: Table, keys: Mapping[str, str], anchor: str) -> Mapping[str, A
     letters = {why: _letters(place) for place, why in enumerate(remarks)}
 
     def cell(value: Value, place: int) -> _Cell:
-        told = common[place] == value.origin
+        known = common[place] == value.origin
         return _Cell(
             value,
             number=_sortable(value.number),
-            mark="" if told else ORIGINS.get(value.origin, ("", ""))[1],
+            mark="" if known else ORIGINS.get(value.origin, ("", ""))[1],
             origin=value.origin,
             record=keys.get(value.record, ""),
             remark=letters.get(value.why, ""),

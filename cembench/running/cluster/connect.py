@@ -102,8 +102,8 @@ def parse_cluster(text: str) -> ClusterPlace:
 
 
 def _wrong(text: str, allowed: str) -> ParameterError:
-    given = Setting("cluster", repr(text))
-    return ParameterError.about("{given} is not allowed; {allowed}", given=given, allowed=allowed)
+    setting = Setting("cluster", repr(text))
+    return ParameterError.about("{given} is not allowed; {allowed}", given=setting, allowed=allowed)
 
 
 def _settings(text: str) -> dict[str, str]:
