@@ -39,16 +39,16 @@ def open_browser():
 
 
 def _programs():
-    found = _find()
-    if None in found:
+    path = _find()
+    if None in path:
         _install()
-        found = _find()
-    if None in found:
+        path = _find()
+    if None in path:
         pytest.skip(
             "NOT CHECKED: pages in a browser; install chromium and chromedriver "
             f"(Debian, as root: apt-get install {' '.join(PACKAGES)})"
         )
-    return found
+    return path
 
 
 def _find():

@@ -66,18 +66,18 @@ def writes(call):
 
 def direct_writes(source):
     """The calls of a source that write to a path, with the functions that they stand in."""
-    found = []
+    collected = []
 
     def visit(node, inside):
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             inside = node.name
         if isinstance(node, ast.Call) and writes(node):
-            found.append((inside, node.lineno))
+            collected.append((inside, node.lineno))
         for child in ast.iter_child_nodes(node):
             visit(child, inside)
 
     visit(ast.parse(source), "")
-    return found
+    return collected
 
 
 def test_no_code_writes_files_but_through_one_function():

@@ -67,9 +67,9 @@ def modules_of(room):
 
 def documented_imports():
     """Every name that README or a page of docs/ tells people to import, with its module."""
-    found = re.compile(r"^\s*from (cembench[\w.]*) import ([\w, ]+)", re.MULTILINE)
+    pattern = re.compile(r"^\s*from (cembench[\w.]*) import ([\w, ]+)", re.MULTILINE)
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
-        for module, names in found.findall(page.read_text()):
+        for module, names in pattern.findall(page.read_text()):
             yield from ((module, name.strip()) for name in names.split(","))
 
 
@@ -88,13 +88,13 @@ PUBLIC = sorted(set(public_names()))
 
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_summary_is_a_question(room):
-    found = [
+    items = [
         f"{path.relative_to(ROOT)}:{line}"
         for path in files_of(room)
         for line in questions(path.read_text())
     ]
     assert files_of(room)
-    assert found == []
+    assert items == []
 
 
 @pytest.mark.parametrize(

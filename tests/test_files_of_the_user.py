@@ -150,8 +150,8 @@ def test_verbs_that_read_change_nothing(cli, decoys, run):
         ("fetch",),
     ):
         cli(*call)
-        found = {p: c for p, c in tree(cli.folder).items() if p != Path("run/lock")}
-        assert found == before, call
+        by_key = {p: c for p, c in tree(cli.folder).items() if p != Path("run/lock")}
+        assert by_key == before, call
 
 
 def test_new_files_beside_the_decoys_touch_none_of_them(cli, decoys, run, monkeypatch):

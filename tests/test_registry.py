@@ -50,12 +50,12 @@ def test_an_entry_point_is_loaded_when_it_is_asked_for(monkeypatch):
     for entry in entries.values():
         entry.load = lambda: load_registry().algorithm("cem").function
     entries["broken"].load = lambda: 1 / 0
-    found = registry._Declared(entries, Algorithm)
-    assert list(found) == ["cem", "broken"]
-    assert "broken" in found
-    assert found["cem"].name == "cem"
+    declared = registry._Declared(entries, Algorithm)
+    assert list(declared) == ["cem", "broken"]
+    assert "broken" in declared
+    assert declared["cem"].name == "cem"
     with pytest.raises(RegistryError, match="division by zero"):
-        found["broken"]
+        declared["broken"]
 
 
 def test_the_built_in_ones_come_by_entry_points():

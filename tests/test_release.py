@@ -61,12 +61,12 @@ def test_every_figure_of_the_paper_is_of_a_kept_record():
     for file, words in quotes:
         assert " ".join(words.split()) in " ".join((ROOT / file).read_text().split()), words
     shown = PAPER.split("# What it shows")[1].split("# Limitations")[0]
-    told = set(re.findall(r"\d+(?:\.\d+)?", QUOTE.sub("", shown)))
+    inside = set(re.findall(r"\d+(?:\.\d+)?", QUOTE.sub("", shown)))
     recorded = set(re.findall(r"\d+(?:\.\d+)?", " ".join(words for _, words in quotes)))
     recorded |= set(
         re.findall(r"(\d+) hold in part", (ROOT / "reports/standard/report.md").read_text())
     )
-    assert told <= recorded
+    assert inside <= recorded
 
 
 def test_the_paper_is_short_and_its_sources_are_listed():
@@ -101,12 +101,12 @@ def test_pins_have_hashes_and_hold_the_versions_of_the_kept_reports():
 
 @pytest.mark.parametrize("form", sorted((ROOT / ".github/ISSUE_TEMPLATE").glob("*.yml")))
 def test_issue_forms_are_as_the_service_reads_them(form):
-    found = yaml.safe_load(form.read_text())
+    parsed = yaml.safe_load(form.read_text())
     if form.name == "config.yml":
-        assert found == {"blank_issues_enabled": True}
+        assert parsed == {"blank_issues_enabled": True}
         return
-    assert {"name", "description", "body"} <= found.keys()
-    for part in found["body"]:
+    assert {"name", "description", "body"} <= parsed.keys()
+    for part in parsed["body"]:
         assert part["type"] in ("textarea", "dropdown", "input")
         assert part["id"]
         assert part["attributes"]["label"]

@@ -51,8 +51,8 @@ def test_a_step_is_the_least_change_that_meets_the_linear_constraints():
 
 def test_newton_meets_the_constraints_and_is_at_a_minimum():
     mesh = uneven()
-    found = abf_plus_plus(mesh)
-    assert max(found.extras[k] for k in found.extras if k.endswith("residual")) < 1e-8
+    result = abf_plus_plus(mesh)
+    assert max(result.extras[k] for k in result.extras if k.endswith("residual")) < 1e-8
     linear = abf_linear(mesh)
     assert linear.extras["triangle_residual"] < 1e-12
     assert linear.extras["vertex_residual"] < 1e-12
@@ -64,10 +64,10 @@ def test_newton_meets_the_constraints_and_is_at_a_minimum():
         return (((np.deg2rad(corner_angles(uv, mesh.F)) - wanted) / wanted) ** 2).sum()
 
     rng = np.random.default_rng(1)
-    least = cost(found.uv)
+    least = cost(result.uv)
     for _ in range(5):
         near = rng.standard_normal(mesh.n) + 1j * rng.standard_normal(mesh.n)
-        assert cost(found.uv + 1e-3 * near) > least
+        assert cost(result.uv + 1e-3 * near) > least
     assert least <= cost(linear.uv)
     assert least < cost(lscm(mesh).uv)
 

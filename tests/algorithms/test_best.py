@@ -24,25 +24,25 @@ def error_of(mesh, uv):
     "mesh", [hard_surface(1), hard_surface(4), swiss_roll(2000), nefertiti()], ids=lambda m: m.name
 )
 def test_it_is_as_good_as_the_best_candidate(mesh):
-    found = best(mesh)
-    assert found.extras["chosen"] in CANDIDATES
-    assert list(found.extras["tried"]) == list(CANDIDATES)
-    errors = [error for error in found.extras["tried"].values() if isinstance(error, float)]
-    chosen = CANDIDATES[found.extras["chosen"]].call(mesh).uv
+    result = best(mesh)
+    assert result.extras["chosen"] in CANDIDATES
+    assert list(result.extras["tried"]) == list(CANDIDATES)
+    errors = [error for error in result.extras["tried"].values() if isinstance(error, float)]
+    chosen = CANDIDATES[result.extras["chosen"]].call(mesh).uv
     assert error_of(mesh, chosen) == min(errors)
-    uv, taken = evened(mesh, angle_gauge(mesh, chosen), found.extras["even_steps"])
-    assert taken == found.extras["even_steps"]
-    np.testing.assert_array_equal(found.uv, uv)
+    uv, taken = evened(mesh, angle_gauge(mesh, chosen), result.extras["even_steps"])
+    assert taken == result.extras["even_steps"]
+    np.testing.assert_array_equal(result.uv, uv)
     assert error_of(mesh, uv) <= min(errors)
-    assert not flipped_triangles(mesh, found.uv)
+    assert not flipped_triangles(mesh, result.uv)
 
 
 def test_with_holes_it_is_as_good_as_the_best_candidate():
     mesh = holed_disk(1500)
-    found = best_holes(mesh)
-    assert set(found.extras["tried"]) == set(OF_HOLES)
-    errors = [error for error in found.extras["tried"].values() if isinstance(error, float)]
-    assert error_of(mesh, found.uv) == min(errors)
+    result = best_holes(mesh)
+    assert set(result.extras["tried"]) == set(OF_HOLES)
+    errors = [error for error in result.extras["tried"].values() if isinstance(error, float)]
+    assert error_of(mesh, result.uv) == min(errors)
     turned = best_holes(mesh, outer=int(mesh.loops[1][0]))
     assert abs(turned.uv[mesh.loops[1]]) == pytest.approx(1)
 
@@ -65,9 +65,9 @@ FAILS = of(None, "it gave up")
 def test_failures_and_folds_are_passed_over():
     mesh = cembench.surface("flat-disk", 200)
     ways = {"fails": FAILS, "folded": FOLDED, "stretched": STRETCHED, "flat": FLAT}
-    found = best_of(mesh, {name: Candidate(way) for name, way in ways.items()}, 60)
-    assert found.extras["chosen"] == "flat"
-    tried = found.extras["tried"]
+    result = best_of(mesh, {name: Candidate(way) for name, way in ways.items()}, 60)
+    assert result.extras["chosen"] == "flat"
+    tried = result.extras["tried"]
     assert tried["fails"] == "it gave up"
     assert tried["folded"] == f"{mesh.m:,} folds"
     assert tried["flat"] < 1e-9 < tried["stretched"]
@@ -76,9 +76,9 @@ def test_failures_and_folds_are_passed_over():
 def test_what_may_take_too_long_is_not_begun():
     mesh = cembench.surface("flat-disk", 200)
     ways = {"stretched": Candidate(STRETCHED), "flat": Candidate(FLAT, cost=1e12)}
-    found = best_of(mesh, ways, 1.0)
-    assert found.extras["chosen"] == "stretched"
-    assert "not tried" in found.extras["tried"]["flat"]
+    result = best_of(mesh, ways, 1.0)
+    assert result.extras["chosen"] == "stretched"
+    assert "not tried" in result.extras["tried"]["flat"]
 
 
 def test_without_a_map_every_cause_is_named_and_a_folded_one_is_left_to_the_judge():
@@ -86,8 +86,8 @@ def test_without_a_map_every_cause_is_named_and_a_folded_one_is_left_to_the_judg
     with pytest.raises(AlgorithmFailed) as failed:
         best_of(mesh, {"fails": Candidate(FAILS), "too": Candidate(FAILS)}, 60)
     assert "fails: it gave up; too: it gave up" in str(failed.value)
-    found = best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 60)
-    assert found.extras["chosen"] == "folded"
+    result = best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 60)
+    assert result.extras["chosen"] == "folded"
 
 
 def test_the_name_stands_for_disks_and_for_surfaces_with_holes():

@@ -45,9 +45,9 @@ def test_exterior_angles_keep_gauss_bonnet_whatever_the_scale(seed):
 
 def test_a_disk_takes_about_ten_sweeps_and_gives_the_map_of_least_energy():
     for mesh in (hemi_ellipsoid(3000), spherical_cap(3000, angle=120.0), hard_surface(2)):
-        found = bff(mesh)
-        assert found.extras["sweeps"] <= 12
-        assert found.extras["gauss_bonnet"] < 1e-10
+        result = bff(mesh)
+        assert result.extras["sweeps"] <= 12
+        assert result.extras["gauss_bonnet"] < 1e-10
     mesh = hemi_ellipsoid(3000)
     mine, least = (all_metrics(mesh, f(mesh).uv) for f in (bff, direct_cem))
     assert mine["conformal_energy"] == pytest.approx(least["conformal_energy"], rel=0.02)
@@ -62,8 +62,8 @@ def test_more_sweeps_do_not_move_the_map():
     "name", ["canonical_face.obj", "nefertiti.obj", "turtle.obj", "demosthenes.off"]
 )
 def test_real_surfaces_take_about_ten_sweeps(name):
-    found = bff(read_mesh(real_mesh(name)))
-    assert found.extras["sweeps"] <= 12
+    result = bff(read_mesh(real_mesh(name)))
+    assert result.extras["sweeps"] <= 12
 
 
 def test_a_boundary_beyond_numbers_is_a_failure():
@@ -81,16 +81,16 @@ def test_a_developable_surface_is_unrolled_as_it_is():
     t = flat.V[:, 0]
     rolled = flat.moved(np.column_stack([np.sin(t), flat.V[:, 1], np.cos(t)]))
     for mesh in (flat, rolled):
-        found = bff_free(mesh)
-        assert found.extras["closing"] < 0.02
+        result = bff_free(mesh)
+        assert result.extras["closing"] < 0.02
     assert all_metrics(flat, bff_free(flat).uv)["angle_error_mean_deg"] < 1e-6
 
 
 def test_the_free_boundary_keeps_its_lengths():
     mesh = hemi_ellipsoid(2000, x=1.5)
-    found = bff_free(mesh)
+    result = bff_free(mesh)
     b = mesh.boundary
-    stretch = np.abs(np.roll(found.uv[b], -1) - found.uv[b]) / np.linalg.norm(
+    stretch = np.abs(np.roll(result.uv[b], -1) - result.uv[b]) / np.linalg.norm(
         np.roll(mesh.V[b], -1, axis=0) - mesh.V[b], axis=1
     )
     assert np.ptp(stretch) < 1e-3 * stretch.mean()

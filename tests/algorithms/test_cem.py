@@ -54,12 +54,12 @@ def algorithm_1(mesh, iterations, inversion=True):
 def test_one_factorisation_gives_what_the_paper_s_lines_give(inversion, iterations, solves):
     mesh = hemi_ellipsoid(1500)
     with linear_algebra(solves):
-        found = cem(
+        result = cem(
             mesh, tolerance=0, max_iterations=iterations, stop="change", inversion=inversion
         )
-    assert found.iterations == iterations
+    assert result.iterations == iterations
     expected = algorithm_1(mesh, iterations, inversion)
-    assert abs(found.uv - expected).max() < 1e-9
+    assert abs(result.uv - expected).max() < 1e-9
 
 
 def test_it_factors_its_two_matrices_once_each(count_calls):
@@ -77,21 +77,21 @@ def test_every_backend_gives_the_same_map(backend):
 
 def test_the_history_is_the_energy_of_each_iterate():
     mesh = hemi_ellipsoid(1500, x=3.0)
-    found = cem(mesh, tolerance=0, max_iterations=8)
-    assert len(found.energy_history) == found.iterations + 1
-    for k in range(found.iterations + 1):
+    result = cem(mesh, tolerance=0, max_iterations=8)
+    assert len(result.energy_history) == result.iterations + 1
+    for k in range(result.iterations + 1):
         uv = cem(mesh, tolerance=0, max_iterations=k).uv
         energy = all_metrics(mesh, uv)["conformal_energy"]
-        assert found.energy_history[k] == pytest.approx(energy, rel=1e-8)
+        assert result.energy_history[k] == pytest.approx(energy, rel=1e-8)
 
 
 @pytest.mark.parametrize("stop", ["drop", "change"])
 def test_it_stops_after_the_first_iteration_that_lowers_the_energy_by_less_than_the_tolerance(stop):
-    found = cem(hemi_ellipsoid(1500, x=3.0), tolerance=1e-4, stop=stop)
-    drops = -np.diff(found.energy_history)
+    result = cem(hemi_ellipsoid(1500, x=3.0), tolerance=1e-4, stop=stop)
+    drops = -np.diff(result.energy_history)
     assert (drops[:-1] >= 1e-4).all()
     assert 0 < drops[-1] < 1e-4
-    assert found.iterations < 20
+    assert result.iterations < 20
 
 
 def test_a_rise_at_first_ends_it_unless_only_small_changes_do():
@@ -149,9 +149,9 @@ def test_the_mirror_image_has_the_mirror_s_energy_and_keeps_its_own_orientation(
 
 
 def test_zero_has_no_inverse_and_raises_no_warning():
-    found = inverted(np.array([0, 2, 1j, 1e-300]))
-    np.testing.assert_array_equal(found[:3], [0, 0.5, 1j])
-    assert found[3] == 0  # its square underflows: as good as zero
+    inverse = inverted(np.array([0, 2, 1j, 1e-300]))
+    np.testing.assert_array_equal(inverse[:3], [0, 0.5, 1j])
+    assert inverse[3] == 0  # its square underflows: as good as zero
 
 
 def test_a_mesh_without_interior_is_a_failure_with_its_cause():
@@ -168,7 +168,7 @@ def test_intrinsic_delaunay_weights_are_an_option():
 
 def test_boundary_vertices_do_not_change_places_on_a_crowded_boundary():
     mesh = read_mesh(real_mesh("turtle.obj"))
-    found = cem(mesh)
-    assert found.extras["order_kept"] > 0
-    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
-    assert (np.diff(found.energy_history) < 0).all()
+    result = cem(mesh)
+    assert result.extras["order_kept"] > 0
+    assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
+    assert (np.diff(result.energy_history) < 0).all()

@@ -34,9 +34,9 @@ def cross_ratio(z, i, j, k, m):
 def test_length_cross_ratios_are_those_of_the_surface(f):
     """Edge by edge, from the points alone."""
     mesh = uneven()
-    found = f(mesh)
-    assert found.extras["curvature"] < 1e-10
-    assert found.extras["fold_repairs"] == 0
+    result = f(mesh)
+    assert result.extras["curvature"] < 1e-10
+    assert result.extras["fold_repairs"] == 0
     opposite = {}
     for a, b, c in mesh.F.tolist():
         opposite |= {(a, b): c, (b, c): a, (c, a): b}
@@ -47,7 +47,7 @@ def test_length_cross_ratios_are_those_of_the_surface(f):
         k, m = opposite[i, j], opposite[j, i]
         on_surface = np.linalg.norm(V[i] - V[k]) * np.linalg.norm(V[j] - V[m])
         on_surface /= np.linalg.norm(V[k] - V[j]) * np.linalg.norm(V[m] - V[i])
-        assert cross_ratio(found.uv, i, j, k, m) == pytest.approx(on_surface, rel=1e-8)
+        assert cross_ratio(result.uv, i, j, k, m) == pytest.approx(on_surface, rel=1e-8)
 
 
 @pytest.mark.parametrize("name", ["nefertiti.obj", "canonical_face.obj", "spothead.obj"])
@@ -57,11 +57,11 @@ def test_real_surfaces_take_few_factorisations_of_one_pattern(f, name, monkeypat
     analysed = []
     kept = cholesky._factor
     monkeypatch.setattr(cholesky, "_factor", lambda *a: analysed.append(1) or kept(*a))
-    found = f(mesh)
+    result = f(mesh)
     assert len(analysed) == 1
-    assert found.extras["factorisations"] <= 15
-    assert found.extras["curvature"] < 1e-10
-    assert found.extras["cross_ratios"] < 1e-8
+    assert result.extras["factorisations"] <= 15
+    assert result.extras["curvature"] < 1e-10
+    assert result.extras["cross_ratios"] < 1e-8
 
 
 def test_the_free_boundary_keeps_its_lengths_and_a_flat_surface_its_shape():

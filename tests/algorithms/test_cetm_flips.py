@@ -103,30 +103,30 @@ def test_it_approaches_the_map_of_cetm():
 @pytest.mark.parametrize("seed", range(10))
 def test_it_ends_where_cetm_cannot(seed):
     mesh = hard_surface(seed)
-    found = cetm_flips(mesh)
-    assert found.extras["curvature"] < 1e-9
-    assert found.extras["folded_before_repair"] <= 0.05 * mesh.m
+    result = cetm_flips(mesh)
+    assert result.extras["curvature"] < 1e-9
+    assert result.extras["folded_before_repair"] <= 0.05 * mesh.m
 
 
 @pytest.mark.parametrize("name", ["nefertiti.obj", "hand_lowres.obj", "canonical_face.obj"])
 def test_it_ends_on_real_surfaces(name):
-    found = cetm_flips(read_mesh(real_mesh(name)))
-    assert found.extras["curvature"] < 1e-9
-    assert found.extras["layout"] < 1e-6
+    result = cetm_flips(read_mesh(real_mesh(name)))
+    assert result.extras["curvature"] < 1e-9
+    assert result.extras["layout"] < 1e-6
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*DISKS, "stress/maze.obj", "stress/hippocampus_unfoldiso.obj"])
 def test_it_ends_on_every_disk(name):
-    found = cetm_flips(read_mesh(real_mesh(name)))
-    assert found.extras["curvature"] < 1e-9
-    assert found.extras["folded_before_repair"] >= 0
+    result = cetm_flips(read_mesh(real_mesh(name)))
+    assert result.extras["curvature"] < 1e-9
+    assert result.extras["folded_before_repair"] >= 0
 
 
 def test_a_flat_disk_comes_out_nearly_as_it_is():
     mesh = flat_disk(1500)
-    found = all_metrics(mesh, cetm_flips(mesh).uv)
-    assert found["angle_error_mean_deg"] < 1.0
+    metrics = all_metrics(mesh, cetm_flips(mesh).uv)
+    assert metrics["angle_error_mean_deg"] < 1.0
 
 
 def test_too_few_steps_are_a_failure():

@@ -43,9 +43,9 @@ def test_it_ignores_geometry():
     V = mesh.V + 0.05 * np.random.default_rng(0).standard_normal(mesh.V.shape)
     packings = [_packed(_Packing(m), 1e-8, 500)[0] for m in (mesh, mesh.moved(V))]
     assert abs(packings[0] - packings[1]).max() < 1e-12
-    found = circle_packing(mesh)
-    assert found.extras["ignores"] == "geometry"
-    assert found.extras["angle_sum"] < 1e-6
+    result = circle_packing(mesh)
+    assert result.extras["ignores"] == "geometry"
+    assert result.extras["angle_sum"] < 1e-6
 
 
 def test_a_symmetric_disk_is_packed_symmetrically():

@@ -64,11 +64,11 @@ def run(spec, mesh):
 
 def assert_same_figures(spec, mesh, other):
     expected = all_metrics(mesh, run(spec, mesh).uv)
-    found = all_metrics(other, run(spec, other).uv)
+    metrics = all_metrics(other, run(spec, other).uv)
     for name in COMPARED:
         scale = expected["image_area"] if name.endswith(("energy", "area")) else expected[name]
-        assert abs(found[name] - expected[name]) <= SAME_FIGURES * scale, name
-    assert found["flipped_triangles"] == expected["flipped_triangles"]
+        assert abs(metrics[name] - expected[name]) <= SAME_FIGURES * scale, name
+    assert metrics["flipped_triangles"] == expected["flipped_triangles"]
 
 
 def test_the_map_is_complex_finite_and_keeps_orientation(spec, mesh):

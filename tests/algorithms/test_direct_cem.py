@@ -29,8 +29,8 @@ def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end
     factored = count_calls(CholmodFactor, "_factor")
     halves = count_calls(CholmodFactor, "condensed"), count_calls(CholmodFactor, "extended")
     whole = count_calls(Cholesky, "solve"), count_calls(Cholesky, "solve_leading")
-    found = direct_cem(uneven_half_ellipsoid(), gauge="triangle")
-    assert found.iterations > 0
+    result = direct_cem(uneven_half_ellipsoid(), gauge="triangle")
+    assert result.iterations > 0
     assert len(factored) == 1
     assert [len(calls) for calls in (*halves, *whole)] == [1, 1, 0, 0]
 
@@ -38,12 +38,12 @@ def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end
 @pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
 def test_energy_falls_from_step_to_step_and_is_that_of_the_map(gauge):
     mesh = uneven_half_ellipsoid()
-    found = direct_cem(mesh, gauge=gauge, back=0, delaunay=False)
-    assert (np.diff(found.energy_history) < 0).all()
-    energy = all_metrics(mesh, found.uv)["conformal_energy"]
-    assert found.energy_history[-1] == pytest.approx(energy, abs=1e-12)
-    assert found.extras["stopped"] == "gradient"
-    assert found.extras["gradient"] ** 2 <= 2e-6 * found.energy_history[-1]
+    result = direct_cem(mesh, gauge=gauge, back=0, delaunay=False)
+    assert (np.diff(result.energy_history) < 0).all()
+    energy = all_metrics(mesh, result.uv)["conformal_energy"]
+    assert result.energy_history[-1] == pytest.approx(energy, abs=1e-12)
+    assert result.extras["stopped"] == "gradient"
+    assert result.extras["gradient"] ** 2 <= 2e-6 * result.energy_history[-1]
 
 
 def test_where_it_stops_energy_could_hardly_fall():
@@ -105,8 +105,8 @@ def test_the_gauge_brings_what_it_names_to_the_origin():
     a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1)
     assert abs((area * uv[mesh.F].mean(axis=1)).sum() / area.sum()) < 5e-3
-    found = direct_cem(mesh, gauge="boundary")
-    uv = found.uv[mesh.boundary]
+    result = direct_cem(mesh, gauge="boundary")
+    uv = result.uv[mesh.boundary]
     lengths = edge_lengths(mesh, mesh.boundary)
     mean = (lengths * (uv + np.roll(uv, -1))).sum() / (2 * lengths.sum())
     assert abs(mean) < 0.03
@@ -138,10 +138,10 @@ def test_every_backend_gives_the_same_map(backend):
 
 
 def test_no_iteration_leaves_the_start():
-    found = direct_cem(uneven_half_ellipsoid(), max_iterations=0)
-    assert found.iterations == 0
-    assert found.extras["stopped"] == "iterations"
-    assert found.extras["start"] in ("harmonic measure", "arc length")
+    result = direct_cem(uneven_half_ellipsoid(), max_iterations=0)
+    assert result.iterations == 0
+    assert result.extras["stopped"] == "iterations"
+    assert result.extras["start"] in ("harmonic measure", "arc length")
 
 
 def test_the_start_is_the_better_of_two(monkeypatch):
@@ -170,35 +170,35 @@ def test_on_a_boundary_crowded_far_below_1e_6_vertices_keep_their_places(gauge):
     V, F = gallery.flat_rectangle(8, 80)  # ten times as long as wide
     V[:, 1] += 0.3 * np.sin(V[:, 0] / 7)
     mesh = DiskMesh.from_arrays(V, F)
-    found = direct_cem(mesh, gauge=gauge)
-    b = found.uv[mesh.boundary]
+    result = direct_cem(mesh, gauge=gauge)
+    b = result.uv[mesh.boundary]
     assert 0 < np.angle(np.roll(b, -1) / b).min() < 1e-7
-    assert flipped_triangles(mesh, found.uv) == 0
-    assert found.extras["stopped"] == "gradient"
-    assert found.extras["held_arcs"] == 0
-    assert all_metrics(mesh, found.uv)["angle_error_mean_deg"] < 8  # coarse: eight cells across
+    assert flipped_triangles(mesh, result.uv) == 0
+    assert result.extras["stopped"] == "gradient"
+    assert result.extras["held_arcs"] == 0
+    assert all_metrics(mesh, result.uv)["angle_error_mean_deg"] < 8  # coarse: eight cells across
 
 
 def test_with_delaunay_weights_two_spikes_do_not_fold():
     mesh = read_mesh(real_mesh("canonical_face.obj"))
-    found = direct_cem(mesh)
-    assert flipped_triangles(mesh, found.uv) == found.extras["fold_repairs"] == 0
+    result = direct_cem(mesh)
+    assert flipped_triangles(mesh, result.uv) == result.extras["fold_repairs"] == 0
 
 
 def test_folds_are_repaired():
     mesh = read_mesh(real_mesh("canonical_face.obj"))
-    found = direct_cem(mesh, delaunay=False)
-    assert found.extras["before_repair"]["flipped_triangles"] > 0
-    assert found.extras["fold_repairs"] > 0
-    assert flipped_triangles(mesh, found.uv) == 0
+    result = direct_cem(mesh, delaunay=False)
+    assert result.extras["before_repair"]["flipped_triangles"] > 0
+    assert result.extras["fold_repairs"] > 0
+    assert flipped_triangles(mesh, result.uv) == 0
 
 
 def test_corners_and_boundary_triangles_without_interior_vertices_are_no_obstacle():
     V, F = gallery.flat_rectangle(6, 9)  # two corners are ears
     mesh = DiskMesh.from_arrays(V, F)
-    found = direct_cem(mesh)
-    assert flipped_triangles(mesh, found.uv) == 0
-    assert found.extras["stopped"] in ("gradient", "rounding")
+    result = direct_cem(mesh)
+    assert flipped_triangles(mesh, result.uv) == 0
+    assert result.extras["stopped"] in ("gradient", "rounding")
 
 
 def test_a_mesh_without_interior_is_a_failure_with_its_cause():
@@ -209,24 +209,24 @@ def test_a_mesh_without_interior_is_a_failure_with_its_cause():
 @pytest.mark.parametrize("name", [d for d in DISKS if not d.startswith("jacksboro")])
 def test_on_real_disks_it_ends_below_cem_without_folds(name):
     mesh = read_mesh(real_mesh(name))
-    found = direct_cem(mesh)
-    figures, other = (all_metrics(mesh, uv) for uv in (found.uv, cem(mesh).uv))
+    result = direct_cem(mesh)
+    figures, other = (all_metrics(mesh, uv) for uv in (result.uv, cem(mesh).uv))
     assert figures["flipped_triangles"] == 0
     assert figures["conformal_energy"] < 1.012 * other["conformal_energy"]
     # Within 1 %: on the coarse hand arcs below a hundredth of the mean decide the last digit.
     assert figures["angle_error_mean_deg"] < 1.01 * other["angle_error_mean_deg"]
-    assert found.iterations <= 8
+    assert result.iterations <= 8
 
 
 def test_half_of_the_vertices_on_the_boundary():
     mesh = read_mesh(real_mesh("stress/maze.obj"))
-    found = direct_cem(mesh)
-    assert backward_arcs(found.uv[mesh.boundary]) == 0
-    assert flipped_triangles(mesh, found.uv) == 0
-    assert found.energy_history[-1] < found.energy_history[0]
+    result = direct_cem(mesh)
+    assert backward_arcs(result.uv[mesh.boundary]) == 0
+    assert flipped_triangles(mesh, result.uv) == 0
+    assert result.energy_history[-1] < result.energy_history[0]
 
 
 def test_products_with_the_hessian_are_few(count_calls):
     calls = count_calls(EnergyModel, "hessian")
-    found = direct_cem(uneven_half_ellipsoid())
-    assert len(calls) == found.extras["hessian_products"] <= 20
+    result = direct_cem(uneven_half_ellipsoid())
+    assert len(calls) == result.extras["hessian_products"] <= 20

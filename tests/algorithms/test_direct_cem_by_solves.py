@@ -51,9 +51,9 @@ def way(monkeypatch):
     inside = quasi_newton.quasi_newton_minimum
 
     def minimum(*arguments, **options):
-        found = inside(*arguments, **options)
-        taken.append(found is not None)
-        return found
+        minimum = inside(*arguments, **options)
+        taken.append(minimum is not None)
+        return minimum
 
     def call(mesh, solves, surely_more=0, **options):
         taken.clear()

@@ -76,10 +76,10 @@ def test_one_factorisation_and_one_dirichlet_solve(count_calls):
 
 def test_energy_falls_from_step_to_step_and_is_that_of_the_map():
     _, mesh = warped(*gallery.THREE_HOLES, 1200)
-    found = direct_cem_holes(mesh)
-    assert (np.diff(found.energy_history) < 0).all()
-    energy = all_metrics(mesh, found.uv)["conformal_energy"]
-    assert found.energy_history[-1] == pytest.approx(energy, abs=1e-12)
+    result = direct_cem_holes(mesh)
+    assert (np.diff(result.energy_history) < 0).all()
+    energy = all_metrics(mesh, result.uv)["conformal_energy"]
+    assert result.energy_history[-1] == pytest.approx(energy, abs=1e-12)
 
 
 def test_any_boundary_can_be_the_outer_one():
@@ -102,10 +102,10 @@ def test_an_outer_vertex_off_the_boundary_is_refused():
 )
 def test_real_surfaces_with_holes(name):
     mesh = read_mesh(real_mesh(f"holes/{name}"), HoledMesh)
-    found = direct_cem_holes(mesh)
-    figures = all_metrics(mesh, found.uv)
+    result = direct_cem_holes(mesh)
+    figures = all_metrics(mesh, result.uv)
     assert figures["flipped_triangles"] == 0
     assert figures["angle_error_mean_deg"] < REAL[name]
     assert figures["boundary_circularity"] < (1e-12 if "plane" not in name else 1e-10)
-    assert found.energy_history[-1] < found.energy_history[0]
-    assert found.extras["stopped"] == "gradient"
+    assert result.energy_history[-1] < result.energy_history[0]
+    assert result.extras["stopped"] == "gradient"

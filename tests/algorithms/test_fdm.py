@@ -43,18 +43,18 @@ def test_reflected_coefficients_approach_those_of_the_reflected_map():
 
 def test_each_iteration_but_the_last_changes_the_distortion():
     mesh = hemi_ellipsoid(5000)
-    found = fdm(mesh, max_iterations=20)
-    assert 1 < found.iterations < 20
-    assert len(found.energy_history) == found.iterations + 1
+    result = fdm(mesh, max_iterations=20)
+    assert 1 < result.iterations < 20
+    assert len(result.energy_history) == result.iterations + 1
     assert fdm(mesh, max_iterations=2).iterations == 2
-    assert found.energy_history[-1] < found.energy_history[0]
+    assert result.energy_history[-1] < result.energy_history[0]
 
 
 def test_the_history_ends_with_the_energy_of_the_map():
     mesh = hemi_ellipsoid(3000)
-    found = fdm(mesh)
-    measured = all_metrics(mesh, found.uv)["conformal_energy"]
-    assert found.energy_history[-1] == pytest.approx(measured, rel=1e-9)
+    result = fdm(mesh)
+    measured = all_metrics(mesh, result.uv)["conformal_energy"]
+    assert result.energy_history[-1] == pytest.approx(measured, rel=1e-9)
 
 
 def test_ears_on_the_boundary_collapse_in_the_half_plane_and_do_no_harm():
@@ -76,9 +76,9 @@ def test_a_start_that_folds_gives_way_to_uniform_weights():
 
 def test_folds_are_repaired():
     mesh = gallery.crumpled_disk()
-    found = fdm(mesh)
-    assert found.extras["fold_repairs"] > 0
-    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+    result = fdm(mesh)
+    assert result.extras["fold_repairs"] > 0
+    assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
 
 
 def test_a_mesh_without_interior_is_refused():
@@ -89,20 +89,20 @@ def test_a_mesh_without_interior_is_refused():
 
 def test_iterations_that_diverge_on_a_coarse_mesh_are_dropped():
     mesh = hemi_ellipsoid(200, z=12.0)
-    found = fdm(mesh)
-    assert found.extras["iterations_dropped"] > 0
-    assert found.iterations + found.extras["iterations_dropped"] == 5
-    energy = all_metrics(mesh, found.uv)["conformal_energy"]
-    assert found.energy_history[-1] == pytest.approx(energy)
+    result = fdm(mesh)
+    assert result.extras["iterations_dropped"] > 0
+    assert result.iterations + result.extras["iterations_dropped"] == 5
+    energy = all_metrics(mesh, result.uv)["conformal_energy"]
+    assert result.energy_history[-1] == pytest.approx(energy)
     # The least mean |mu| is kept, whose energy is near the least one.
-    assert found.energy_history[-1] < 1.05 * min(found.energy_history)
+    assert result.energy_history[-1] < 1.05 * min(result.energy_history)
 
 
 def test_the_public_program_gives_the_printed_digits_of_nefertiti():
     mesh = read_mesh(real_mesh("nefertiti.obj"))
-    found = [all_metrics(mesh, fdm(mesh.fresh(), public_program=slip).uv) for slip in (True, False)]
+    items = [all_metrics(mesh, fdm(mesh.fresh(), public_program=slip).uv) for slip in (True, False)]
     keys = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
-    slip, corrected = ([one[key] for key in keys] for one in found)
+    slip, corrected = ([one[key] for key in keys] for one in items)
     assert [f"{slip[0]:.4f}", f"{slip[1]:.2f}", f"{slip[2]:.2f}"] == ["0.0242", "2.48", "3.36"]
     assert slip == pytest.approx([0.02416, 2.4768, 3.3558], abs=1e-4)
     assert f"{corrected[0]:.4f}" == "0.0241"

@@ -47,5 +47,5 @@ def test_no_angle_is_measured_where_there_is_nothing_to_gain():
     def measured(uv):
         raise AssertionError("not asked for")
 
-    here = EnergyModel(bordered.dirichlet_to_neumann(), domain, domain.outer_measure)
-    assert len((here.energy, *gauge_walk(here, bordered.harmonic_extension, measured)[1])) == 1
+    model = EnergyModel(bordered.dirichlet_to_neumann(), domain, domain.outer_measure)
+    assert len((model.energy, *gauge_walk(model, bordered.harmonic_extension, measured)[1])) == 1

@@ -218,14 +218,14 @@ def test_real_surfaces_map_without_folds_and_with_round_holes(name):
     mesh = read_mesh(real_mesh(f"holes/{name}"), HoledMesh)
     result = koebe_cem(mesh)
     assert not faults(koebe_cem.__cembench__, mesh, result.uv)
-    found = all_metrics(mesh, result.uv)
-    print(name, found)
-    assert found["boundary_circularity"] < 1e-9
+    metrics = all_metrics(mesh, result.uv)
+    print(name, metrics)
+    assert metrics["boundary_circularity"] < 1e-9
     if name == "alex_3holes.obj":
-        assert found["angle_error_mean_deg"] < 1
+        assert metrics["angle_error_mean_deg"] < 1
     baseline = all_metrics(mesh, harmonic_filled(mesh).uv)
-    assert found["angle_error_mean_deg"] < baseline["angle_error_mean_deg"]
-    assert found["conformal_energy"] < baseline["conformal_energy"]
+    assert metrics["angle_error_mean_deg"] < baseline["angle_error_mean_deg"]
+    assert metrics["conformal_energy"] < baseline["conformal_energy"]
 
 
 def test_more_sweeps_lower_the_energy_where_one_is_not_enough():

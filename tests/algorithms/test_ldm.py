@@ -13,9 +13,9 @@ from tests import gallery
 
 
 def test_it_is_direct():
-    found = ldm(hemi_ellipsoid(600))
-    assert found.iterations == 0
-    assert found.energy_history == ()
+    result = ldm(hemi_ellipsoid(600))
+    assert result.iterations == 0
+    assert result.energy_history == ()
 
 
 def test_its_time_is_told_by_phases():
@@ -43,9 +43,9 @@ def test_ears_on_the_boundary_do_no_harm(rows):
 
 def test_folds_are_repaired():
     crumpled = gallery.crumpled_disk()
-    found = ldm(crumpled)
-    assert found.extras["fold_repairs"] > 0
-    assert all_metrics(crumpled, found.uv)["flipped_triangles"] == 0
+    result = ldm(crumpled)
+    assert result.extras["fold_repairs"] > 0
+    assert all_metrics(crumpled, result.uv)["flipped_triangles"] == 0
 
 
 def test_a_mesh_without_interior_is_refused():
@@ -75,8 +75,8 @@ def test_a_boundary_beside_the_centre_is_named_as_a_limit_of_the_method():
     mesh = cone_over(45)
     with pytest.raises(AlgorithmFailed, match=r"LDM does not lay the boundary .* use direct-cem"):
         ldm(mesh)
-    found = ldm(mesh, last_resort=True)
-    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+    result = ldm(mesh, last_resort=True)
+    assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
 
 
 @pytest.mark.parametrize("noise", [0, 0.03])

@@ -44,22 +44,22 @@ def test_the_opened_disk_has_round_holes_and_no_folds():
 
 def test_the_only_boundary_with_ears_is_the_outer_one():
     mesh, ear = round_disk_with_an_eared_hole()
-    found = direct_cem_holes(mesh)
-    assert abs(found.uv[ear]) == pytest.approx(1)
-    assert is_valid(mesh, found.uv)
-    assert boundary_circularity(mesh, found.uv) < 1e-12
+    result = direct_cem_holes(mesh)
+    assert abs(result.uv[ear]) == pytest.approx(1)
+    assert is_valid(mesh, result.uv)
+    assert boundary_circularity(mesh, result.uv) < 1e-12
 
 
 def test_an_ear_on_a_hole_leaves_its_circle_and_does_not_fold():
     mesh, ear = gallery.eared_hole()
     outer, (hole,) = mesh.outer_and_holes()
     assert flipped_triangles(mesh, direct_cem_holes(mesh, outer=int(outer[0]), repair=False).uv)
-    found = direct_cem_holes(mesh, outer=int(outer[0]))
-    assert is_valid(mesh, found.uv)
-    assert found.extras["folded_before_repair"] > 0
-    others = found.uv[hole[hole != ear]]
+    result = direct_cem_holes(mesh, outer=int(outer[0]))
+    assert is_valid(mesh, result.uv)
+    assert result.extras["folded_before_repair"] > 0
+    others = result.uv[hole[hole != ear]]
     centre = np.abs(others - others.mean()).mean()
-    assert np.abs(found.uv[ear] - others.mean()) < centre
+    assert np.abs(result.uv[ear] - others.mean()) < centre
 
 
 def test_a_wrecked_map_is_replaced_and_the_note_tells():
@@ -89,7 +89,7 @@ def test_a_valid_map_stays_as_it_is():
 def test_a_long_tube_is_an_annulus_whose_radius_the_record_holds():
     V, F = gallery.tube()
     mesh = HoledMesh.from_arrays(V * [1, 1, 5], F)
-    found = direct_cem_holes(mesh)
-    assert found.extras["stopped"] == "annulus"
-    assert is_valid(mesh, found.uv)
-    assert min(circle.radius for circle in boundary_circles(mesh, found.uv)) < 1e-3
+    result = direct_cem_holes(mesh)
+    assert result.extras["stopped"] == "annulus"
+    assert is_valid(mesh, result.uv)
+    assert min(circle.radius for circle in boundary_circles(mesh, result.uv)) < 1e-3

@@ -35,12 +35,12 @@ def test_mean_values_give_a_flat_disk_as_it_is():
 @pytest.mark.parametrize("f", [harmonic_tutte, mean_value])
 def test_positive_weights_do_not_fold(f, seed):
     mesh = hard_surface(seed)
-    found = f(mesh)
-    if found.extras["fold_repairs"]:  # only triangles with all corners on the boundary do
+    result = f(mesh)
+    if result.extras["fold_repairs"]:  # only triangles with all corners on the boundary do
         on = np.isin(mesh.F, mesh.boundary).all(axis=1)
-        assert found.extras["before_repair"]["flipped_triangles"] <= on.sum()
+        assert result.extras["before_repair"]["flipped_triangles"] <= on.sum()
     else:
-        assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
+        assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
 
 
 def test_mean_values_need_an_interior():

@@ -65,20 +65,20 @@ def test_paths_are_straight_lines_of_the_plane_after_flat_flips():
 @pytest.mark.parametrize("seed", range(3))
 def test_the_refinement_is_the_same_surface_and_has_no_folds(seed):
     mesh = bumpy(seed=seed)
-    found = refined_map(mesh, repair=False)
-    fine = DiskMesh.from_arrays(found.mesh.V, found.mesh.F)
-    assert found.extras["flips"] > 20
+    result = refined_map(mesh, repair=False)
+    fine = DiskMesh.from_arrays(result.mesh.V, result.mesh.F)
+    assert result.extras["flips"] > 20
     assert fine.m > mesh.m
-    assert np.bincount(found.triangle, areas(fine)) == pytest.approx(areas(mesh))
-    assert not flipped_triangles(fine, found.uv)
-    assert is_disk_map(fine, found.uv)
+    assert np.bincount(result.triangle, areas(fine)) == pytest.approx(areas(mesh))
+    assert not flipped_triangles(fine, result.uv)
+    assert is_disk_map(fine, result.uv)
 
 
 def test_its_given_vertices_are_where_cetm_flips_puts_them():
     mesh = bumpy()
     own = cetm_flips(mesh, repair=False)
-    found = refined_map(mesh, repair=False)
-    np.testing.assert_allclose(found.uv[: mesh.n], own.uv, atol=1e-14)
+    result = refined_map(mesh, repair=False)
+    np.testing.assert_allclose(result.uv[: mesh.n], own.uv, atol=1e-14)
 
 
 def test_parameterize_returns_and_writes_the_refined_surface(tmp_path):

@@ -73,11 +73,11 @@ def test_the_formats_of_programs_that_are_not_here_are_read(tmp_path):
     faces = enumerate((mesh.F + 1).tolist())
     lines += [f"f {a}/{3 * k + 1} {b}/{3 * k + 2} {c}/{3 * k + 3}" for k, (a, b, c) in faces]
     (tmp_path / "bff.obj").write_text("\n".join(lines))
-    found = read_output(tmp_path / "bff.obj", REGISTRY.algorithm("bff-program-disk"), mesh)
-    assert np.abs(found.uv - uv).max() < 1e-5
+    result = read_output(tmp_path / "bff.obj", REGISTRY.algorithm("bff-program-disk"), mesh)
+    assert np.abs(result.uv - uv).max() < 1e-5
     lines = [f"v {z.real!r} {z.imag!r} 0" for z in uv.tolist()]
     lines += [f"f {a} {b} {c}" for a, b, c in (mesh.F + 1).tolist()]
     (tmp_path / "flat.obj").write_text("\n".join(lines))
     assert np.array_equal(read_flat(tmp_path / "flat.obj").uv, uv)
-    found = read_output(tmp_path / "flat.obj", REGISTRY.algorithm("openabf"), mesh)
-    assert np.array_equal(found.uv, uv)
+    result = read_output(tmp_path / "flat.obj", REGISTRY.algorithm("openabf"), mesh)
+    assert np.array_equal(result.uv, uv)

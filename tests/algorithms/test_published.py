@@ -28,12 +28,12 @@ def lion():
 
 
 def cells(mesh, result):
-    found = all_metrics(mesh, result.uv)
-    assert found["flipped_triangles"] == 0
+    metrics = all_metrics(mesh, result.uv)
+    assert metrics["flipped_triangles"] == 0
     return (
-        found["conformal_energy"],
-        found["angle_error_mean_deg"],
-        found["angle_error_sd_deg"],
+        metrics["conformal_energy"],
+        metrics["angle_error_mean_deg"],
+        metrics["angle_error_sd_deg"],
     )
 
 

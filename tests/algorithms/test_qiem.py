@@ -42,23 +42,23 @@ def test_too_long_a_step_is_no_error_and_a_shorter_one_works(L, solves):
 
 
 def test_the_energy_falls_from_step_to_step():
-    found = qiem(hemi_ellipsoid(2000))
-    assert found.iterations > 5
-    assert (np.diff(found.energy_history) <= 0).all()
+    result = qiem(hemi_ellipsoid(2000))
+    assert result.iterations > 5
+    assert (np.diff(result.energy_history) <= 0).all()
 
 
 def test_the_symbolic_analysis_of_the_flow_is_done_once(count_calls):
     mesh = hemi_ellipsoid(600)
     analysed = count_calls(CholmodFactor, "_analyse")
     factored = count_calls(CholmodFactor, "_factor")
-    found = qiem(mesh)
-    assert found.iterations > 10
-    assert len(factored) > found.iterations
+    result = qiem(mesh)
+    assert result.iterations > 10
+    assert len(factored) > result.iterations
     assert len(analysed) <= 3  # the start, the flow, the last Dirichlet solve
     analysed.clear()
     with linear_algebra("backslash"):
         qiem(mesh)
-    assert len(analysed) > found.iterations
+    assert len(analysed) > result.iterations
 
 
 def test_too_few_steps_are_a_failure_with_its_cause():
@@ -68,9 +68,9 @@ def test_too_few_steps_are_a_failure_with_its_cause():
 
 def test_folds_are_repaired():
     crumpled = gallery.crumpled_disk()
-    found = qiem(crumpled)
-    assert found.extras["fold_repairs"] > 0
-    assert all_metrics(crumpled, found.uv)["flipped_triangles"] == 0
+    result = qiem(crumpled)
+    assert result.extras["fold_repairs"] > 0
+    assert all_metrics(crumpled, result.uv)["flipped_triangles"] == 0
 
 
 def test_a_mesh_without_interior_is_refused():

@@ -37,11 +37,11 @@ def test_by_area_it_is_the_spectral_map_of_libigl():
 def test_by_area_it_is_that_of_libigl_on_real_surfaces(name):
     mesh = read_mesh(real_mesh(name))
     UV = igl.spectra.lscm(mesh.V, mesh.F)
-    found = scp(mesh, weights="area", tolerance=1e-9)
-    if found.extras["fold_repairs"] == 0:
-        assert distance(found.uv, UV[:, 0] + 1j * UV[:, 1]) < 1e-6
+    result = scp(mesh, weights="area", tolerance=1e-9)
+    if result.extras["fold_repairs"] == 0:
+        assert distance(result.uv, UV[:, 0] + 1j * UV[:, 1]) < 1e-6
     else:
-        assert distance(found.uv, UV[:, 0] + 1j * UV[:, 1]) < 1e-2
+        assert distance(result.uv, UV[:, 0] + 1j * UV[:, 1]) < 1e-2
 
 
 @pytest.mark.parametrize("weights", ["boundary", "length"])
@@ -129,9 +129,9 @@ def test_a_long_boundary_is_solved_for_with_the_interior(monkeypatch):
 @pytest.mark.parametrize("weights", ["boundary", "length", "area"])
 def test_a_flat_surface_comes_out_as_it_is(weights):
     mesh = flat_disk(600, stretch=2.0)
-    found = all_metrics(mesh, scp(mesh, weights=weights).uv)
-    assert abs(found["conformal_energy"]) < 1e-9
-    assert found["angle_error_mean_deg"] < 1e-3
+    metrics = all_metrics(mesh, scp(mesh, weights=weights).uv)
+    assert abs(metrics["conformal_energy"]) < 1e-9
+    assert metrics["angle_error_mean_deg"] < 1e-3
 
 
 def test_too_few_sweeps_are_a_failure():

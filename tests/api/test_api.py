@@ -160,25 +160,25 @@ def test_benchmark_gives_tables(disk, tmp_path):
 
 
 def test_morph_and_theory_take_what_parameterize_takes(disk):
-    found = cembench.morph([disk, (disk.V * [1, 1, 2], disk.F)])
-    np.testing.assert_allclose(found.at(0.0), disk.V, atol=1e-9)
+    result = cembench.morph([disk, (disk.V * [1, 1, 2], disk.F)])
+    np.testing.assert_allclose(result.at(0.0), disk.V, atol=1e-9)
     assert cembench.theory(disk).facts["boundary_vertices"] == len(disk.boundary)
     with pytest.raises(cembench.ParameterError, match="two surfaces or more"):
         cembench.morph([disk])
 
 
 def test_validate_returns_findings():
-    found = cembench.validate("harmonic-circle", checks_only=True)
-    assert found.algorithm == "harmonic-circle"
-    assert found.findings
+    result = cembench.validate("harmonic-circle", checks_only=True)
+    assert result.algorithm == "harmonic-circle"
+    assert result.findings
 
 
 @pytest.mark.parametrize("module", WITH_EXAMPLES)
 def test_the_examples_in_docstrings_run(module, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    found = doctest.testmod(importlib.import_module(module))
-    assert found.attempted >= 1
-    assert not found.failed
+    outcome = doctest.testmod(importlib.import_module(module))
+    assert outcome.attempted >= 1
+    assert not outcome.failed
 
 
 def test_ten_public_names_have_an_example():
@@ -208,9 +208,9 @@ def test_repair_and_cut_take_what_parameterize_takes(kind, tmp_path):
 
 def test_repair_says_what_it_did_and_gives_every_component():
     V, F = (np.asarray(a) for a in gallery.two_pieces())
-    found = cembench.repair((np.vstack([V, [[np.nan, 0, 0]]]), F), components="all")
-    assert [type(mesh) for mesh in found.meshes] == [cembench.DiskMesh] * 2
-    assert found.steps["isolated_vertices_removed"] == 1
+    result = cembench.repair((np.vstack([V, [[np.nan, 0, 0]]]), F), components="all")
+    assert [type(mesh) for mesh in result.meshes] == [cembench.DiskMesh] * 2
+    assert result.steps["isolated_vertices_removed"] == 1
     assert len(cembench.repair((V, F)).meshes) == 1
 
 
@@ -280,8 +280,8 @@ def test_map_tells_the_certificate(tmp_path):
 
 def test_a_map_of_a_surface_with_holes_that_failed_has_its_cause():
     row = {"mesh": "ring", "algorithm": "koebe-cem", "status": "failed", "cause": "it gave up"}
-    found = HoledMaps({}, [row])
+    result = HoledMaps({}, [row])
     with pytest.raises(cembench.AlgorithmFailed, match="ring / koebe-cem: failed: it gave up"):
-        found["koebe-cem"]
+        result["koebe-cem"]
     with pytest.raises(KeyError):
-        found["lscm"]
+        result["lscm"]

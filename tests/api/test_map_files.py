@@ -141,8 +141,8 @@ def test_a_geometry_image_is_written_for_other_programs(cli, result, tmp_path):
     np.testing.assert_array_equal(samples, result.geometry_image(17))
     with OpenEXR.File(str(cli.folder / "a.exr")) as file:
         np.testing.assert_allclose(file.channels()["RGB"].pixels, samples, atol=1e-6)
-    found = pyvista.read(cli.folder / "a.png")
-    pixels = found["PNGImage"].reshape(17, 17, 4)[::-1].astype(float) / 65535
+    loaded = pyvista.read(cli.folder / "a.png")
+    pixels = loaded["PNGImage"].reshape(17, 17, 4)[::-1].astype(float) / 65535
     low, extent = result.mesh.V.min(axis=0), np.ptp(result.mesh.V, axis=0).max()
     np.testing.assert_allclose(pixels[..., :3] * extent + low, samples, atol=2e-5 * extent)
     assert (pixels[..., 3] == 1).all()

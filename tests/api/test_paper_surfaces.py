@@ -46,8 +46,8 @@ def test_all_are_fetched_and_the_next_time_no_server_is_asked(server):
 def test_each_that_cannot_be_fetched_is_counted_with_the_reason(server):
     (here,) = models("nefertiti")
     fetch_models([here])
-    told = fetch_models([here, *models("cowboy-hat", "missing")])
-    assert told == (
+    message = fetch_models([here, *models("cowboy-hat", "missing")])
+    assert message == (
         "fetched 1 of the paper's models (1 fetched before); 1 could not be reached "
         "(HTTPError): stand-ins are measured"
     )
@@ -65,10 +65,10 @@ def test_each_that_cannot_be_fetched_is_counted_with_the_reason(server):
 def test_a_bad_server_costs_no_more_than_the_time_and_stand_ins_are_measured(server, way, why):
     """The server of the first two goes on until the end of the test."""
     wanted = models(f"{way}-1", f"{way}-2")
-    told = fetch_models(wanted, seconds=0.5)
-    assert told.startswith("the paper's models could not be reached (")
-    assert why in told
-    assert told.endswith("): stand-ins are measured")
+    message = fetch_models(wanted, seconds=0.5)
+    assert message.startswith("the paper's models could not be reached (")
+    assert why in message
+    assert message.endswith("): stand-ins are measured")
     assert not any(map(is_fetched, wanted))
     assert not server.released.is_set()
 
@@ -118,7 +118,7 @@ def test_where_a_process_is_killed_the_rest_is_made_one_after_the_other(tmp_path
     monkeypatch.setattr(paper_surfaces, "process_pool", broken)
     made = lambda registry, name: flat_disk(60).renamed(name)  # noqa: E731
     monkeypatch.setattr(paper_surfaces, "generate_surface", made)
-    told = []
-    made = make_stand_ins(load_registry(), SMALL, 2, lambda *words: told.append(words))
+    collected = []
+    made = make_stand_ins(load_registry(), SMALL, 2, lambda *words: collected.append(words))
     assert [mesh.name for mesh in made] == list(SMALL)
-    assert [counts for _, *counts in told] == [[1, 2], [2, 2]]
+    assert [counts for _, *counts in collected] == [[1, 2], [2, 2]]

@@ -12,8 +12,8 @@ def disks():
 
 def test_maps_are_those_of_single_calls_and_come_in_order():
     surfaces = disks()
-    found = list(cembench.parameterize_many(surfaces))
-    for mesh, result in zip(surfaces, found, strict=True):
+    results = list(cembench.parameterize_many(surfaces))
+    for mesh, result in zip(surfaces, results, strict=True):
         alone = cembench.parameterize(mesh)
         assert result.mesh.hash == mesh.hash
         np.testing.assert_array_equal(result.z, alone.z)
@@ -22,8 +22,8 @@ def test_maps_are_those_of_single_calls_and_come_in_order():
 
 def test_several_processes_give_the_same():
     surfaces = [(mesh.V, mesh.F) for mesh in disks()] * 4
-    found = list(cembench.parameterize_many(surfaces, "cem", jobs=2, tolerance=1e-6))
-    for (V, F), result in zip(surfaces, found, strict=True):
+    results = list(cembench.parameterize_many(surfaces, "cem", jobs=2, tolerance=1e-6))
+    for (V, F), result in zip(surfaces, results, strict=True):
         alone = cembench.parameterize(V, F, algorithm="cem", tolerance=1e-6)
         np.testing.assert_array_equal(result.z, alone.z)
         assert result.algorithm is alone.algorithm

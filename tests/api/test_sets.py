@@ -38,9 +38,9 @@ def folder(tmp_path):
 def test_a_folder_gives_what_it_holds_and_the_reasons_for_the_rest(folder):
     registry = load_registry()
     algorithms = [registry.algorithm("cem")]
-    found = gathered(surfaces_of_set(str(folder), registry), registry, algorithms)
-    assert [one.name for one in found.surfaces] == ["deeper-flat", "flat"]
-    why = {one.name: one.error for one in found.refused}
+    result = gathered(surfaces_of_set(str(folder), registry), registry, algorithms)
+    assert [one.name for one in result.surfaces] == ["deeper-flat", "flat"]
+    why = {one.name: one.error for one in result.refused}
     assert set(why) == {"damaged", "holed"}
     assert "HoledMesh" in why["holed"]
 
@@ -52,10 +52,10 @@ def test_a_manifest_names_the_surfaces_of_a_folder_and_says_where_they_are_from(
         "flat\t\tus/meshes\tsheet\n"
     )
     registry = load_registry()
-    given = surfaces_of_set(str(folder), registry)
-    found = gathered(given, registry, [registry.algorithm("cem")])
-    assert [(one.name, one.licence) for one in found.surfaces] == [("round", "MIT"), ("flat", "")]
-    assert found.roles == {
+    surfaces = surfaces_of_set(str(folder), registry)
+    result = gathered(surfaces, registry, [registry.algorithm("cem")])
+    assert [(one.name, one.licence) for one in result.surfaces] == [("round", "MIT"), ("flat", "")]
+    assert result.roles == {
         "round": Provenance(source="us/meshes", family="cone"),
         "flat": Provenance(source="us/meshes", family="sheet"),
     }
@@ -82,9 +82,9 @@ def test_the_corpus_is_read_from_the_folder_that_a_variable_names(folder, monkey
 def test_faces_of_one_model_are_one_family(monkeypatch):
     monkeypatch.setenv("CEMBENCH_ICT_FACE", str(real_mesh("ict/generic_neutral_mesh.obj").parent))
     registry = load_registry()
-    given = surfaces_of_set("ict-faces", registry, limit=2)
-    found = gathered(given, registry, [registry.algorithm("cem")])
-    assert {role.family for role in found.roles.values()} == {"ict-face"}
+    surfaces = surfaces_of_set("ict-faces", registry, limit=2)
+    result = gathered(surfaces, registry, [registry.algorithm("cem")])
+    assert {role.family for role in result.roles.values()} == {"ict-face"}
 
 
 @pytest.mark.parametrize("name", ["woody", "hand-optcuts", "frog-sofa", "lego", "eight"])
@@ -106,11 +106,11 @@ def test_an_archive_is_a_set_and_its_names_do_not_clash_with_a_folders(folder, t
     with zipfile.ZipFile(archive, "w") as file:
         file.write(tmp_path / "flat.obj", "flat.obj")
     registry = load_registry()
-    given = [
+    items = [
         one for name in (folder, archive) for one in surfaces_of_set(str(name), registry, limit=9)
     ]
-    found = gathered(given, registry, [registry.algorithm("cem")])
-    assert [one.name for one in found.surfaces] == ["deeper-flat", "flat", "flat-2"]
+    result = gathered(items, registry, [registry.algorithm("cem")])
+    assert [one.name for one in result.surfaces] == ["deeper-flat", "flat", "flat-2"]
 
 
 def test_an_unknown_set_names_those_there_are():
@@ -126,9 +126,9 @@ def test_every_group_that_a_set_names_is_in_the_catalogue():
 def test_files_that_cannot_be_fetched_are_given_with_the_reason(monkeypatch, tmp_path):
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
     monkeypatch.setenv("CEMBENCH_DATA_URL", "http://127.0.0.1:9")
-    found = list(surfaces_of_set("real-holes", load_registry(), limit=3))
-    assert len(found) == 3
-    assert all(one.mesh is None and "cannot fetch" in one.error for one in found)
+    results = list(surfaces_of_set("real-holes", load_registry(), limit=3))
+    assert len(results) == 3
+    assert all(one.mesh is None and "cannot fetch" in one.error for one in results)
 
 
 def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder, tmp_path):

@@ -77,8 +77,8 @@ def check(found):
 
 
 def test_a_folder_gives_all_its_surfaces_and_says_what_cannot_be_used(folder):
-    found = {p.name.removeprefix("deeper-"): p for p in surfaces_of_folder(folder)}
-    check(found)
+    by_key = {p.name.removeprefix("deeper-"): p for p in surfaces_of_folder(folder)}
+    check(by_key)
     assert len(list(surfaces_of_folder(folder, limit=2))) == 2
     with pytest.raises(ParameterError, match="is not a folder"):
         list(surfaces_of_folder(folder / "disk.obj"))
@@ -112,9 +112,9 @@ def test_an_archive_is_not_trusted(tmp_path, monkeypatch):
             info.type, info.linkname = kind, "/etc/passwd"
             archive.addfile(info)
     before = sorted(tmp_path.iterdir())
-    found = list(surfaces_of_archive(tmp_path / "bad.tar"))
-    assert [p.name for p in found] == ["outside", "outside-2", "disk", "disk-2"]
-    assert all(p.mesh is not None for p in found)
+    results = list(surfaces_of_archive(tmp_path / "bad.tar"))
+    assert [p.name for p in results] == ["outside", "outside-2", "disk", "disk-2"]
+    assert all(p.mesh is not None for p in results)
     assert sorted(tmp_path.iterdir()) == before
     assert not outside.exists()
 

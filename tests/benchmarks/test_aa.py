@@ -17,15 +17,15 @@ def run(twin, other):
 
 
 def test_what_is_called_different_is_counted_with_its_interval(tmp_path):
-    found = aa.summarise([run(1.0, 3.0), run(1.2, 3.0), run(1.0, 4.0)], ["cem", "ldm"])
-    assert (found["comparisons"], found["called_different"]) == (3, 1)
-    assert found["interval"] == (pytest.approx(0.0084, abs=1e-3), pytest.approx(0.906, abs=1e-3))
-    assert (found["speedups_compared"], found["speedups_overlapping"]) == (3, 1)
-    assert found["largest_difference"] == pytest.approx(1 / 3)
-    (tmp_path / "busy.json").write_text(json.dumps(found))
-    told = str(aa.section(tmp_path))
-    assert "| beside a busy neighbour | 3 | 3 | 1 (33.3%) |" in told
-    assert "| quiet |" not in told
+    summary = aa.summarise([run(1.0, 3.0), run(1.2, 3.0), run(1.0, 4.0)], ["cem", "ldm"])
+    assert (summary["comparisons"], summary["called_different"]) == (3, 1)
+    assert summary["interval"] == (pytest.approx(0.0084, abs=1e-3), pytest.approx(0.906, abs=1e-3))
+    assert (summary["speedups_compared"], summary["speedups_overlapping"]) == (3, 1)
+    assert summary["largest_difference"] == pytest.approx(1 / 3)
+    (tmp_path / "busy.json").write_text(json.dumps(summary))
+    text = str(aa.section(tmp_path))
+    assert "| beside a busy neighbour | 3 | 3 | 1 (33.3%) |" in text
+    assert "| quiet |" not in text
 
 
 def test_busy_loops_end_with_the_block():

@@ -22,11 +22,11 @@ def test_a_small_surface_fills_a_line_of_each_table(clock):
 
 
 def test_the_exponent_is_that_of_the_seconds():
-    found = [
+    items = [
         {"faces": m, "seconds": dict.fromkeys([*FLOORS, *METHODS], 1e-6 * m**1.25)}
         for m in (1000, 10_000, 300_000)
     ]
-    assert exponent(found, "cem") == pytest.approx(1.25)
+    assert exponent(items, "cem") == pytest.approx(1.25)
 
 
 def test_a_surface_is_a_cap_or_a_file_split_some_times(tmp_path):

@@ -50,14 +50,14 @@ def test_the_fit_finds_a_moebius_map(turn):
     rng = np.random.default_rng(0)
     z = 0.9 * np.sqrt(rng.random(40)) * np.exp(2j * np.pi * rng.random(40))
     move = to_centre(0.5 - 0.3j, turn)
-    found = fitted(z, move(z), np.ones(40))
-    assert np.abs(found(z) - move(z)).max() < 1e-6
+    fit = fitted(z, move(z), np.ones(40))
+    assert np.abs(fit(z) - move(z)).max() < 1e-6
 
 
 def test_pairs_are_a_third_of_each_kind_and_a_person_is_kept_where_only_the_expression_changes():
-    found = registration.specimens(30)
-    assert [sum(kind == k for kind, _, _ in found) for k in registration.KINDS] == [10, 10, 10]
-    for kind, one, other in found:
+    specimens = registration.specimens(30)
+    assert [sum(kind == k for kind, _, _ in specimens) for k in registration.KINDS] == [10, 10, 10]
+    for kind, one, other in specimens:
         assert (one[0] == other[0]) == (kind == "expression")
         assert (other[1] == "neutral") == (kind == "identity")
         assert one[1] == "neutral"

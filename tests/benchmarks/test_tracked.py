@@ -18,9 +18,9 @@ ROOT = Path(__file__).parents[2]
 def test_what_takes_long_is_there_only_on_request(monkeypatch, wanted, there):
     monkeypatch.setenv(cases.VARIABLE, wanted)
     monkeypatch.delitem(sys.modules, algorithms.__name__)
-    found = importlib.import_module(algorithms.__name__)
-    assert hasattr(found, "MoreDisks") == there
-    assert hasattr(found, "Disks")
+    module = importlib.import_module(algorithms.__name__)
+    assert hasattr(module, "MoreDisks") == there
+    assert hasattr(module, "Disks")
 
 
 @pytest.mark.parametrize("algorithm", cases.algorithm_names(DiskMesh))
@@ -41,11 +41,11 @@ def test_the_fields_algorithms_are_tracked_and_real_disks_where_they_are_at_hand
     for there, names in ((str(folder), cases.REAL), ("nowhere", ())):
         monkeypatch.setenv(cases.MESHES_VARIABLE, there)
         monkeypatch.delitem(sys.modules, algorithms.__name__)
-        found = importlib.import_module(algorithms.__name__)
-        assert hasattr(found, "RealDisks") == bool(names)
+        module = importlib.import_module(algorithms.__name__)
+        assert hasattr(module, "RealDisks") == bool(names)
         if names:
-            assert found.RealDisks.params[1] == list(names)
-            bench = found.RealDisks()
+            assert module.RealDisks.params[1] == list(names)
+            bench = module.RealDisks()
             bench.setup("direct-cem", "demosthenes.off")
             assert bench.track_folds("direct-cem", "demosthenes.off") == 0
 

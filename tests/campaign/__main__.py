@@ -85,11 +85,11 @@ def main(
 def _replay(id: str, chosen: list[campaign.Part[Any]], console: Console) -> int:
     """Repeat one case, whatever a journal says, and tell what became of it; 2 if there is none."""
     name, _, key = id.partition(":")
-    found = [(p, c) for p in chosen if p.name == name for c in p.cases if p.key(c) == key]
-    if not found:
+    items = [(p, c) for p in chosen if p.name == name for c in p.cases if p.key(c) == key]
+    if not items:
         console.print(f"there is no case {id}", markup=False)
         return 2
-    part, case = found[0]
+    part, case = items[0]
     part.begin([case])
     (ending,) = run_cases([case], part.judge, part.limits, slots=1)
     entry = campaign.entry_of(part, ending)

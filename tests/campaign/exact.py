@@ -112,18 +112,18 @@ def _edges(polygon: Sequence[Point]) -> Iterator[tuple[Point, Point]]:
 
 def _faults_of_circle(polygon: Sequence[Point]) -> list[str]:
     """Whether the points lie on the unit circle, each further round than the last, once round."""
-    found = []
+    collected = []
     squared = [x * x + y * y for x, y in polygon]
     if not all((1 - CIRCLE) ** 2 <= r <= (1 + CIRCLE) ** 2 for r in squared):
-        found.append("the outer boundary is not on the unit circle")
+        collected.append("the outer boundary is not on the unit circle")
     equal = sum(_compare(a, b) == 0 for a, b in _edges(polygon))
     if equal:
-        found.append(f"{equal} pairs of neighbours on the boundary are at the same angle")
+        collected.append(f"{equal} pairs of neighbours on the boundary are at the same angle")
     # Along a boundary that runs once round, the angle from 0 to 2 pi falls once.
     falls = sum(_compare(a, b) > 0 and not _by_rounding(a, b) for a, b in _edges(polygon))
     if falls != 1:
-        found.append(f"along the boundary the angle falls {falls} times, not once")
-    return found
+        collected.append(f"along the boundary the angle falls {falls} times, not once")
+    return collected
 
 
 def _compare(a: Point, b: Point) -> int:
@@ -145,15 +145,15 @@ def _lower_half(a: Point) -> bool:
 
 
 def _faults_of_holes(outer: Sequence[Point], holes: Sequence[Sequence[Point]]) -> list[str]:
-    found = []
+    collected = []
     edges = [(n, edge) for n, loop in enumerate([outer, *holes]) for edge in _edges(loop)]
     boxes = [_box(edge) for _, edge in edges]
     for (i, (m, one)), (j, (n, other)) in combinations(enumerate(edges), 2):
         shared = m == n and not {*one}.isdisjoint(other)
         if not shared and _boxes_meet(boxes[i], boxes[j]) and _meet(*one, *other):
-            found.append("two boundaries cross, or one crosses itself")
+            collected.append("two boundaries cross, or one crosses itself")
             break
-    return found
+    return collected
 
 
 def circles_out_of_place(uv: Sequence[complex], faces: Sequence[Face]) -> list[str]:
@@ -165,13 +165,13 @@ def circles_out_of_place(uv: Sequence[complex], faces: Sequence[Face]) -> list[s
     loops = [[points[k] for k in loop] for loop in boundary_loops(faces)]
     holes = sorted(loops, key=twice_area)[:-1]
     circles = [circle for circle in map(_circle, holes) if circle[2] <= CIRCULAR]
-    found = []
+    collected = []
     for (c, r, _), (d, s, _) in combinations(circles, 2):
         if abs(c - d) < (r + s) * (1 - CIRCULAR):
-            found.append("the circles of two holes overlap")
+            collected.append("the circles of two holes overlap")
     if any(abs(c) + r > 1 + CIRCULAR for c, r, _ in circles):
-        found.append("the circle of a hole reaches out of the disk")
-    return found
+        collected.append("the circle of a hole reaches out of the disk")
+    return collected
 
 
 def _box(edge: tuple[Point, Point]) -> tuple[Fraction, Fraction, Fraction, Fraction]:

@@ -143,9 +143,9 @@ def judge_kill(plan: Plan, moment: float, usual: Usual, prepared: Path, place: P
         outcome = "killed" if killed else "had ended"
         if left:
             return Verdict(outcome, "process left", f"not ended with its parent: {left}")
-        found = harmed(owned, folder)
-        if found:
-            return Verdict(outcome, "harmed", f"by the killed call: {', '.join(found)}")
+        damaged = harmed(owned, folder)
+        if damaged:
+            return Verdict(outcome, "harmed", f"by the killed call: {', '.join(damaged)}")
         finished = _finished(plan, folder)
         broken = [
             name for name in finished if name.endswith(".json") and not _is_json(folder / name)
@@ -156,9 +156,9 @@ def judge_kill(plan: Plan, moment: float, usual: Usual, prepared: Path, place: P
         again, said = _finish(_call(plan, folder, environment))
         if again is None or "Traceback (most recent call last)" in said:
             return Verdict(outcome, "hang" if again is None else "traceback", said[-800:])
-        found = harmed(owned, folder)
-        if found:
-            return Verdict(outcome, "harmed", f"by the second call: {', '.join(found)}")
+        damaged = harmed(owned, folder)
+        if damaged:
+            return Verdict(outcome, "harmed", f"by the second call: {', '.join(damaged)}")
         lost = _changed(finished, folder)
         if lost:
             return Verdict(outcome, "finished lost", ", ".join(lost))

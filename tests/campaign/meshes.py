@@ -96,9 +96,9 @@ def wrong_ok(
     if uv is None:
         return "wrong ok", "there is no map"
     z, faces = uv.tolist(), [tuple(face) for face in mesh.F.tolist()]
-    found = faults_of_map(z, faces, target)
-    if found:
-        return "wrong ok", "; ".join(found)
+    faults = faults_of_map(z, faces, target)
+    if faults:
+        return "wrong ok", "; ".join(faults)
     misplaced = circles_out_of_place(z, faces) if target == "circular holes" else []
     if misplaced and not outcome.notes:
         return "untold circles", "; ".join(misplaced)

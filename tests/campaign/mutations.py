@@ -138,10 +138,10 @@ def drop_word(data: bytes, rng: random.Random) -> bytes:
 
 def replace_number(data: bytes, rng: random.Random) -> bytes:
     """Write another number, or none, for a number."""
-    found = list(_NUMBER.finditer(data))
-    if not found:
+    results = list(_NUMBER.finditer(data))
+    if not results:
         return replace_bytes(data, rng)
-    where = rng.choice(found)
+    where = rng.choice(results)
     return data[: where.start()] + rng.choice(_NUMBERS) + data[where.end() :]
 
 
@@ -196,10 +196,10 @@ def repeat_all(data: bytes, rng: random.Random) -> bytes:
 
 def exchange_keyword(data: bytes, rng: random.Random) -> bytes:
     """Misspell or change the case of a keyword."""
-    found = list(re.finditer(rb"[A-Za-z_]{1,16}", data[:2000]))
-    if not found:
+    results = list(re.finditer(rb"[A-Za-z_]{1,16}", data[:2000]))
+    if not results:
         return flip_bits(data, rng)
-    where = rng.choice(found)
+    where = rng.choice(results)
     word = where.group()
     new = rng.choice((word.upper(), word[:-1], word + b"s", word + b" ", b"list", b"vertex", b""))
     return data[: where.start()] + new + data[where.end() :]

@@ -127,5 +127,5 @@ def _commit() -> str:
     """Return the commit of the sources, marked where they differ from it."""
     command = ["git", "describe", "--always", "--dirty", "--abbrev=10"]
     place = Path(__file__).parent
-    found = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
-    return found.stdout.strip() or "unknown"
+    result = subprocess.run(command, cwd=place, capture_output=True, text=True, check=False)
+    return result.stdout.strip() or "unknown"

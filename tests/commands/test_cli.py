@@ -37,11 +37,11 @@ METRICS = {
 
 def test_map_prints_the_metrics_under_their_names(cli, cap):
     code, out, _ = cli("map", cap, "-a", "cem", "-p", "max_iterations=2", "--json")
-    found = json.loads(out)
+    data = json.loads(out)
     assert code == 0
-    assert set(found) >= METRICS | {"iterations", "seconds", "phases", "status", "notices"}
-    assert found["parameters"]["max_iterations"] == 2
-    assert found["iterations"] <= 2
+    assert set(data) >= METRICS | {"iterations", "seconds", "phases", "status", "notices"}
+    assert data["parameters"]["max_iterations"] == 2
+    assert data["iterations"] <= 2
     assert not list(cli.folder.iterdir())
 
 
@@ -174,17 +174,17 @@ def test_list_in_words_and_as_json(cli):
     code, out, _ = cli("list", "algorithms", "--verbose")
     assert "Faithful to Algorithm 1" in out
     assert "spherical-cap" not in out
-    found = json.loads(cli("list", "--plugin", FAULTY, "--json")[1])
-    assert "folded" in {a["name"] for a in found["algorithms"]}
+    data = json.loads(cli("list", "--plugin", FAULTY, "--json")[1])
+    assert "folded" in {a["name"] for a in data["algorithms"]}
     assert json.loads(cli("list", "surfaces", "--json")[1]).keys() == {"surfaces"}
 
 
 def test_doctor_is_well(cli):
     code, out, _ = cli("doctor", "--json")
     assert code == 0
-    found = {finding["name"]: finding for finding in json.loads(out)}
-    assert found["cholesky"]["ok"]
-    assert found["cholesky"]["detail"].startswith(f"{', '.join(available_backends())} (default")
+    by_key = {finding["name"]: finding for finding in json.loads(out)}
+    assert by_key["cholesky"]["ok"]
+    assert by_key["cholesky"]["detail"].startswith(f"{', '.join(available_backends())} (default")
 
 
 def test_doctor_says_what_is_missing(cli, monkeypatch):

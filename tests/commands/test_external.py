@@ -103,10 +103,10 @@ def test_tables_and_rows_mark_the_program_and_tell_its_times(cli, monkeypatch):
     words += ("--program", "name=mine", "--reference", "direct-cem")
     code, out, err = cli(*words)
     assert code == 0, err
-    told = " ".join(out.split())
-    assert "mine †" in told
-    assert "† external program: its seconds are the wall clock of a process" in told
-    assert "solve 0.125 s (printed by the program)" in told
+    message = " ".join(out.split())
+    assert "mine †" in message
+    assert "† external program: its seconds are the wall clock of a process" in message
+    assert "solve 0.125 s (printed by the program)" in message
     code, out, _ = cli(*words, "--json")
     ours, row = json.loads(out)
     assert (ours["external"], ours["start_seconds"], ours["solve_seconds"]) == (None, None, None)

@@ -40,14 +40,14 @@ def test_two_files_morph_into_films_meshes_and_arrays(pair):
         *("-o", "a.gif", "-o", "a.npz", "-o", "a.obj"),
     )
     assert (code, err) == (0, "")
-    found = json.loads(out)
-    (row,) = found["registrations"]
+    data = json.loads(out)
+    (row,) = data["registrations"]
     assert row["surface"] == "smile"
     assert row["landmark_error_share"] < 0.01
     assert row["flipped_triangles"] == 0
     assert row["distance_mean_edges"] < 0.5
-    assert found["landmarks"] == ["nose", "eye right", "eye left", "mouth"]
-    assert set(found["seconds"]) == {"maps", "registration", "frames", "film"}
+    assert data["landmarks"] == ["nose", "eye right", "eye left", "mouth"]
+    assert set(data["seconds"]) == {"maps", "registration", "frames", "film"}
     first = read_mesh(pair.folder / "calm.obj")
     with np.load(pair.folder / "a.npz") as arrays:
         assert arrays["frames"].shape == (5, first.n, 3)
@@ -129,9 +129,9 @@ def coarse(cli):
     def morph(pairs):
         text = "\n".join(f"m{k},{a},{b}" for k, (a, b) in enumerate(pairs))
         (cli.folder / "marks.csv").write_text(text)
-        found = cli("morph", "a.obj", "b.obj", "--landmarks", "marks.csv", "-o", "c.npz")
+        result = cli("morph", "a.obj", "b.obj", "--landmarks", "marks.csv", "-o", "c.npz")
         assert not (cli.folder / "c.npz").exists()
-        return found
+        return result
 
     z = mesh.V[mesh.interior, 0] + 1j * mesh.V[mesh.interior, 1]
     return morph, z, mesh.interior
@@ -177,14 +177,14 @@ def test_three_expressions_morph_without_folds_and_jumps(cli):
     names = ("liu-wry-face-stand-in", "liu-neutral-face-stand-in", "liu-smile-face-stand-in")
     code, out, _ = cli("morph", *names, "--faces", 8000, "--run", "run", "--json")
     assert code == 0
-    found = json.loads(out)
-    for row in found["registrations"]:
+    data = json.loads(out)
+    for row in data["registrations"]:
         assert row["flipped_triangles"] == 0
         assert row["landmark_error_share"] < 0.01
         assert row["distance_mean_edges"] < 0.5
-    assert found["largest_step_share"] < 0.01
+    assert data["largest_step_share"] < 0.01
     strip, boards = read_exhibits(cli.folder / "run")
     assert "--faces 8000" in strip.command
-    assert strip.facts["registrations"] == found["registrations"]
+    assert strip.facts["registrations"] == data["registrations"]
     assert (strip.figure, boards.figure) == ("Figure 13", "Figure 14")
     assert strip.origin == "stand-in"

@@ -43,11 +43,11 @@ def test_repair_prints_every_step_and_writes_the_surface(bad_file, cli):
 
 def test_repair_as_json_has_every_step(bad_file, cli):
     code, out, _ = cli("repair", bad_file, "-o", "good.ply", "--json")
-    told = json.loads(out)
+    data = json.loads(out)
     assert code == 0
-    assert set(told["steps"]) == {step.value for step in Step}
-    assert told["steps"]["isolated_vertices_removed"] == 1
-    assert told["surfaces"] == [
+    assert set(data["steps"]) == {step.value for step in Step}
+    assert data["steps"]["isolated_vertices_removed"] == 1
+    assert data["surfaces"] == [
         {
             "vertices": 217,
             "faces": 384,
@@ -123,15 +123,15 @@ def test_run_repairs_on_request(bad_file, cli):
 
 def test_cut_writes_the_disk_and_its_seam(torus_file, cli):
     code, out, _ = cli("cut", torus_file, "-o", "disk.obj", "--json")
-    told = json.loads(out)
+    data = json.loads(out)
     assert code == 0
     disk = read_mesh(cli.folder / "disk.obj", DiskMesh)
-    with (cli.folder / told["seam"]).open() as file:
+    with (cli.folder / data["seam"]).open() as file:
         original = [int(row["original"]) for row in csv.DictReader(file)]
     V, F = gallery.torus()
     np.testing.assert_array_equal(V[original], disk.V)
     np.testing.assert_array_equal(np.array(original)[disk.F], F)
-    assert len(told["cut_edges"]) * 2 == told["boundary_vertices"] == len(disk.boundary)
+    assert len(data["cut_edges"]) * 2 == data["boundary_vertices"] == len(disk.boundary)
 
 
 def test_cut_between_vertices(tmp_path, cli):
@@ -157,9 +157,9 @@ def test_the_map_of_a_closed_surface_has_uvs_by_corner_on_the_original(cli):
     assert json.loads(out)["flipped_triangles"] == 0
     mesh = read_mesh(original, TriangleMesh)
     assert read_mesh(cli.folder / "uv.obj", TriangleMesh).hash == mesh.hash
-    found = trimesh.load_mesh(cli.folder / "uv.obj", process=False)
-    np.testing.assert_allclose(found.vertices[found.faces], mesh.V[mesh.F], atol=1e-7)
-    z = found.visual.uv[found.faces] @ [1, 1j]
+    loaded = trimesh.load_mesh(cli.folder / "uv.obj", process=False)
+    np.testing.assert_allclose(loaded.vertices[loaded.faces], mesh.V[mesh.F], atol=1e-7)
+    z = loaded.visual.uv[loaded.faces] @ [1, 1j]
     area = ((z[:, 1] - z[:, 0]).conj() * (z[:, 2] - z[:, 0])).imag
     assert area.min() > 0
     assert area.sum() / 2 == pytest.approx(np.pi / 4, rel=0.05)  # the unit square's disk
@@ -246,8 +246,8 @@ def test_disks_and_surfaces_with_holes_are_mapped_together(tmp_path, cli):
     (tmp_path / "tube.obj").write_text(gallery.obj_text(*gallery.tube()))
     code, out, err = cli("map", tmp_path / "disk.obj", tmp_path / "tube.obj", "--json")
     assert code in (0, 1), err
-    told = [row["algorithm"] for row in json.loads(out)]
-    assert told == ["direct-cem", "direct-cem-holes"]
+    items = [row["algorithm"] for row in json.loads(out)]
+    assert items == ["direct-cem", "direct-cem-holes"]
 
 
 def test_a_file_keeps_names_of_any_encoding(tmp_path, cli):

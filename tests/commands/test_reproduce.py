@@ -44,9 +44,9 @@ def one_model(cli, monkeypatch, tmp_path):
 def test_a_model_replaces_its_stand_in_and_all_is_reported(cli, one_model):
     code, out, err = cli("reproduce", "-o", "here", "--budget", "0s", "--json")
     assert code == 0, err
-    found = json.loads(out)
-    assert found["surfaces"] == {"Nefertiti": "model", "Cowboy Hat": "stand-in"}
-    cells = {(cell["mesh"], cell["algorithm"]) for cell in found["cells"]}
+    data = json.loads(out)
+    assert data["surfaces"] == {"Nefertiti": "model", "Cowboy Hat": "stand-in"}
+    cells = {(cell["mesh"], cell["algorithm"]) for cell in data["cells"]}
     assert cells == {(m, a) for m in ("nefertiti", "cowboy-hat-stand-in") for a in FOUR}
     parameters = {
         (r.cell.mesh, r.cell.algorithm): r.cell.parameters
@@ -54,7 +54,7 @@ def test_a_model_replaces_its_stand_in_and_all_is_reported(cli, one_model):
     }
     assert parameters["nefertiti", "fdm"]["public_program"]
     assert not parameters["cowboy-hat-stand-in", "fdm"]["public_program"]
-    assert found["report"]["claims"]["always-faster"] == "too few rounds"
+    assert data["report"]["claims"]["always-faster"] == "too few rounds"
     assert (cli.folder / "here/report/report.tex").is_file()
     lines = err.splitlines()
     assert lines[:4] == [
@@ -71,12 +71,12 @@ def test_the_call_does_what_the_command_does(cli, one_model, monkeypatch):
     code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s", "--json")
     assert code == 0, err
     printed = json.loads(out)
-    found = cembench.reproduce(cli.folder / "here", offline=True, budget=0)  # resumes
-    assert dict(found.surfaces) == printed["surfaces"]
+    result = cembench.reproduce(cli.folder / "here", offline=True, budget=0)  # resumes
+    assert dict(result.surfaces) == printed["surfaces"]
     cells = {row["algorithm"]: row["conformal_energy"] for row in printed["cells"]}
-    metrics = {r.cell.algorithm: r.outcome.metrics["conformal_energy"] for r in found.run.asked}
+    metrics = {r.cell.algorithm: r.outcome.metrics["conformal_energy"] for r in result.run.asked}
     assert metrics == cells
-    assert found.report.title == printed["report"]["title"]
+    assert result.report.title == printed["report"]["title"]
 
 
 def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model, monkeypatch):

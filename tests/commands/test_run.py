@@ -38,9 +38,9 @@ def test_status_counts_and_names_what_is_not_ok(runs):
     store = Store(runs.folder / "two")
     store.save_plan(asked)
     store.samples(asked[1], "e").save_round(0, record_of([1.0]).outcome.rounds[0])
-    found = json.loads(runs("status", "two", "--json")[1])
-    assert found["states"] == {"ok": 1, "in work": 1, "waiting": 1}
-    assert (found["asked"], found["recorded_besides"], found["measuring"]) == (3, 2, False)
+    data = json.loads(runs("status", "two", "--json")[1])
+    assert data["states"] == {"ok": 1, "in work": 1, "waiting": 1}
+    assert (data["asked"], data["recorded_besides"], data["measuring"]) == (3, 2, False)
     assert "in work: 1 of 6 rounds done" in runs("status", "two")[1]
     precise = record_of([], algorithm="fdm", mesh="hat", repeats=0, precision=0.05).cell
     store.save_plan([precise])
@@ -65,14 +65,14 @@ def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
     assert code == 0
     lines = out.splitlines()
     assert [line.split()[-1] for line in lines[1:3]] == ["faster", "undecided"]
-    told = " ".join(lines[3:])
-    assert "drift between the runs is unknown" in told
-    assert "Holm, 2 comparisons" in told
+    message = " ".join(lines[3:])
+    assert "drift between the runs is unknown" in message
+    assert "Holm, 2 comparisons" in message
     assert max(map(len, out.splitlines())) <= 80
     assert "measured under different conditions" in err
     assert "cpu: one / two" in err
-    found = json.loads(runs("compare", "one", "two", "--json")[1])
-    assert found["cells"][0]["ratio"] == pytest.approx(0.5)
+    data = json.loads(runs("compare", "one", "two", "--json")[1])
+    assert data["cells"][0]["ratio"] == pytest.approx(0.5)
     assert "warning" not in runs("compare", "one", "one")[2]
 
 
@@ -128,9 +128,9 @@ def test_a_dry_run_tells_the_cells_and_their_cost(cli):
     assert max(map(len, out.splitlines())) <= 80
     assert not list(cli.folder.iterdir())
     assert cli(*arguments)[0] == 0
-    found = json.loads(cli(*arguments, "--solves", "reuse,backslash", "--dry-run", "--json")[1])
-    assert [cell["held"] for cell in found["cells"]] == ["ok", "ok", None, None]
-    assert found["seconds"] == sum(c["estimate"]["seconds"] for c in found["cells"][2:])
+    data = json.loads(cli(*arguments, "--solves", "reuse,backslash", "--dry-run", "--json")[1])
+    assert [cell["held"] for cell in data["cells"]] == ["ok", "ok", None, None]
+    assert data["seconds"] == sum(c["estimate"]["seconds"] for c in data["cells"][2:])
 
 
 def test_both_policies_stand_in_tables_of_their_own(cli):
@@ -173,16 +173,16 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
         "    globals()[f's{k}'] = declare(k, row)\n"
     )
     arguments = ("run", "-a", "cem", "--plugin", plugin, "--dry-run", "--json")
-    found = json.loads(cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")[1])
-    assert [cell["mesh"] for cell in found["cells"]] == ["a", "b", *(f"s{k}" for k in range(8))]
+    data = json.loads(cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")[1])
+    assert [cell["mesh"] for cell in data["cells"]] == ["a", "b", *(f"s{k}" for k in range(8))]
 
 
 def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
     from cembench.registry import load_registry
     from cembench.running.plan import Provenance, provenances
 
-    found = provenances(load_registry(), ["foot-stand-in", "flat-disk"])
-    assert found == {
+    sources = provenances(load_registry(), ["foot-stand-in", "flat-disk"])
+    assert sources == {
         "foot-stand-in": Provenance("Foot", "stand-in", family="foot-stand-in"),
         "flat-disk": Provenance(family="flat-disk"),
     }
@@ -195,8 +195,8 @@ def test_a_surface_that_lies_in_a_folder_in_two_formats_is_measured_once(cli):
 
     for name in ("a.obj", "a.ply"):
         write_mesh(cli.folder / name, flat_disk(100))
-    found = json.loads(cli("run", "-a", "cem", "--mesh-dir", ".", "--dry-run", "--json")[1])
-    assert [cell["mesh"] for cell in found["cells"]] == ["a"]
+    data = json.loads(cli("run", "-a", "cem", "--mesh-dir", ".", "--dry-run", "--json")[1])
+    assert [cell["mesh"] for cell in data["cells"]] == ["a"]
 
 
 def test_ctrl_c_says_that_the_same_command_resumes(cli, monkeypatch):

@@ -16,9 +16,9 @@ def lopsided():
 def test_the_centre_comes_to_the_origin_on_the_sphere(lopsided):
     S, mass = lopsided
     assert np.linalg.norm(mass @ S) / mass.sum() > 0.99
-    found = moebius_centred(S, mass)
-    assert np.linalg.norm(mass @ found) / mass.sum() < 1e-12
-    np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1, rtol=1e-14)
+    centred = moebius_centred(S, mass)
+    assert np.linalg.norm(mass @ centred) / mass.sum() < 1e-12
+    np.testing.assert_allclose(np.linalg.norm(centred, axis=1), 1, rtol=1e-14)
 
 
 def test_it_is_a_moebius_map(lopsided):

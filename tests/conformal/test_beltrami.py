@@ -94,8 +94,8 @@ def test_the_solver_reproduces_an_affine_map(disk):
     affine = (0.7 + 0.2j) + (1.3 - 0.4j) * z + (0.3 + 0.5j) * np.conj(z)
     mu = np.full(len(F), (0.3 + 0.5j) / (1.3 - 0.4j))
     b = ring(z)
-    found = linear_beltrami_solver(F, generalised_weights(z, F, mu), b, affine[b])
-    np.testing.assert_allclose(found, affine, atol=1e-12)
+    result = linear_beltrami_solver(F, generalised_weights(z, F, mu), b, affine[b])
+    np.testing.assert_allclose(result, affine, atol=1e-12)
 
 
 def test_the_solver_finds_a_map_from_its_coefficients(disk):
@@ -105,9 +105,9 @@ def test_the_solver_finds_a_map_from_its_coefficients(disk):
     mu = beltrami_coefficients(z, F, in_plane(map_))
     assert np.abs(mu).max() < 1
     b = ring(z)
-    found = linear_beltrami_solver(F, generalised_weights(z, F, mu), b, map_[b])
-    assert np.abs(beltrami_coefficients(z, F, in_plane(found)) - mu).max() < 0.05
-    assert np.abs(found - map_).max() < 0.01
+    result = linear_beltrami_solver(F, generalised_weights(z, F, mu), b, map_[b])
+    assert np.abs(beltrami_coefficients(z, F, in_plane(result)) - mu).max() < 0.05
+    assert np.abs(result - map_).max() < 0.01
 
 
 def test_an_unfolded_coefficient_is_that_of_the_triangle_turned_over(disk):

@@ -86,16 +86,16 @@ def test_steps_keep_the_gauge(ring):
 
 def test_energy_falls_at_every_step_down_to_a_stationary_point(ring):
     _, _, S, domain, weights = ring
-    found = minimise(S, domain, weights, tolerance=1e-14, max_iterations=50)
-    assert (np.diff(found.energies) < 0).all()
-    assert found.reason == "gradient"
-    assert found.gradient**2 <= 2e-14 * found.energies[-1]
+    result = minimise(S, domain, weights, tolerance=1e-14, max_iterations=50)
+    assert (np.diff(result.energies) < 0).all()
+    assert result.reason == "gradient"
+    assert result.gradient**2 <= 2e-14 * result.energies[-1]
     rng = np.random.default_rng(6)
     for _ in range(10):  # nowhere near is it lower
-        model = EnergyModel(S, found.model.domain, weights)
+        model = EnergyModel(S, result.model.domain, weights)
         x = model.precondition(rng.standard_normal(len(model.gradient)))
         near = in_gauge(model.moved(1e-3 * x / np.linalg.norm(x)), weights)
-        assert EnergyModel(S, near, weights).energy > found.energies[-1]
+        assert EnergyModel(S, near, weights).energy > result.energies[-1]
 
 
 def test_arcs_at_their_least_length_do_not_become_shorter(ring):
@@ -114,17 +114,17 @@ def test_with_too_many_arcs_at_their_least_length_it_stops(ring, monkeypatch):
     _, _, S, domain, weights = ring
     monkeypatch.setattr(boundary_energy, "MOST_HELD", 0)
     stuck = replace(in_gauge(domain, weights), least=0.999 * in_gauge(domain, weights).arcs)
-    found = minimise(S, stuck, weights, tolerance=1e-7, max_iterations=50)
-    assert found.reason == "crowded"
-    assert np.isnan(found.gradient)
-    assert found.held_arcs > 0
+    result = minimise(S, stuck, weights, tolerance=1e-7, max_iterations=50)
+    assert result.reason == "crowded"
+    assert np.isnan(result.gradient)
+    assert result.held_arcs > 0
 
 
 def test_a_limit_on_iterations_is_kept_and_told(ring):
     _, _, S, domain, weights = ring
-    found = minimise(S, domain, weights, tolerance=1e-12, max_iterations=1)
-    assert found.reason == "iterations"
-    assert len(found.energies) == 2
+    result = minimise(S, domain, weights, tolerance=1e-12, max_iterations=1)
+    assert result.reason == "iterations"
+    assert len(result.energies) == 2
 
 
 def test_every_moebius_image_has_the_same_one_in_the_gauge(ring):

@@ -29,10 +29,10 @@ def rectangle(rows, columns, width):
 
 def test_a_rectangle_has_the_modulus_width_over_height_exactly():
     mesh, corner = rectangle(5, 8, width=2.5)
-    found = certify(mesh, corner)
-    assert found.upper == pytest.approx(2.5, rel=1e-12)
-    assert found.conjugate == pytest.approx(1 / 2.5, rel=1e-12)
-    assert abs(found.reciprocal_error) < 1e-12
+    certificate = certify(mesh, corner)
+    assert certificate.upper == pytest.approx(2.5, rel=1e-12)
+    assert certificate.conjugate == pytest.approx(1 / 2.5, rel=1e-12)
+    assert abs(certificate.reciprocal_error) < 1e-12
 
 
 def test_a_quarter_of_a_ring_has_the_modulus_of_its_logarithm():
@@ -43,9 +43,9 @@ def test_a_quarter_of_a_ring_has_the_modulus_of_its_logarithm():
         z = 2 ** (j / n) * np.exp(0.5j * np.pi * i / n)
         mesh = DiskMesh.from_arrays(np.stack([z.real, z.imag, 0 * j], 1), F)
         corner = np.array([0, n, (n + 1) ** 2 - 1, n * (n + 1)])
-        found = certify(mesh, corner)
-        errors.append(abs(found.modulus / (np.log(2) / (np.pi / 2)) - 1))
-        gaps.append(found.reciprocal_error)
+        certificate = certify(mesh, corner)
+        errors.append(abs(certificate.modulus / (np.log(2) / (np.pi / 2)) - 1))
+        gaps.append(certificate.reciprocal_error)
     for fell in (errors, gaps):
         np.testing.assert_allclose(np.log2(np.array(fell[:-1]) / fell[1:]), 2, atol=0.15)
 
@@ -92,10 +92,10 @@ def test_the_modulus_of_a_cap_is_that_of_its_boundary_angles():
         loop, n = mesh.boundary, len(mesh.boundary)
         corner = loop[[0, n // 6, n // 2, 3 * n // 4]]
         exact = mesh.V[corner, 0] + 1j * mesh.V[corner, 1]
-        found = certify(mesh, corner)
-        gaps.append(found.reciprocal_error)
-        errors.append(abs(disk_modulus(exact / np.abs(exact)) / found.modulus - 1))
-        assert found.lower < disk_modulus(exact / np.abs(exact)) < found.upper
+        certificate = certify(mesh, corner)
+        gaps.append(certificate.reciprocal_error)
+        errors.append(abs(disk_modulus(exact / np.abs(exact)) / certificate.modulus - 1))
+        assert certificate.lower < disk_modulus(exact / np.abs(exact)) < certificate.upper
     # The potential has the root of the distance at each corner: first order.
     np.testing.assert_allclose(np.log2(np.array(gaps[:-1]) / gaps[1:]), 1, atol=0.2)
     assert errors[2] < errors[0] / 3
@@ -103,12 +103,12 @@ def test_the_modulus_of_a_cap_is_that_of_its_boundary_angles():
 
 def test_a_map_that_is_not_conformal_is_found_out_where_angles_are_few():
     mesh = hemi_ellipsoid(6144)
-    found = certify(mesh)
-    good, bad = (mapped(mesh).uv[found.corners] for mapped in (direct_cem, harmonic_circle))
-    assert abs(found.off(good)) < 1e-3
-    assert found.encloses(good)
-    assert abs(found.off(bad)) > 0.02
-    assert not found.encloses(bad)
+    certificate = certify(mesh)
+    good, bad = (mapped(mesh).uv[certificate.corners] for mapped in (direct_cem, harmonic_circle))
+    assert abs(certificate.off(good)) < 1e-3
+    assert certificate.encloses(good)
+    assert abs(certificate.off(bad)) > 0.02
+    assert not certificate.encloses(bad)
 
 
 def test_points_that_are_no_quadrilateral_are_refused():
@@ -136,9 +136,9 @@ def test_the_capacity_of_a_ring_is_enclosed_and_the_bounds_close_at_second_order
     """Its map to the annulus has log(1 / r) = 2 pi / C = 1."""
     widths, errors = [], []
     for faces in (500, 8000):
-        found = certify_holes(cembench.surface("catenoid-ring", faces))
-        middle = np.sqrt(found.lower[0, 0] * found.upper[0, 0])
-        widths.append(found.reciprocal_error)
+        certificate = certify_holes(cembench.surface("catenoid-ring", faces))
+        middle = np.sqrt(certificate.lower[0, 0] * certificate.upper[0, 0])
+        widths.append(certificate.reciprocal_error)
         errors.append(abs(middle / (2 * np.pi) - 1))
     for fell in (widths, errors):
         assert fell[0] > 0
@@ -172,16 +172,16 @@ def split(V, F):
 def test_circles_that_are_not_the_surface_s_are_found_out(shift):
     """A map that moves one hole of a plane domain keeps circles, but is not conformal."""
     mesh = gallery.three_holes(5000)
-    found = certify_holes(mesh)
+    certificate = certify_holes(mesh)
     z = mesh.V[:, 0] + 1j * mesh.V[:, 1]
     centre, radius = (some[0] for some in gallery.THREE_HOLES)
     far = np.abs(z - centre)
     moved = z + shift * np.clip((radius + 0.15 - far) / 0.15, 0, 1)
-    least, most = found.off(moved[found.corners])
-    assert found.encloses(moved[found.corners]) == (shift == 0)
+    least, most = certificate.off(moved[certificate.corners])
+    assert certificate.encloses(moved[certificate.corners]) == (shift == 0)
     assert least <= most < 0.1 + 10 * shift
     ending = "these circles may be" if shift == 0 else "to these circles is conformal"
-    assert ending in found.words(moved[found.corners])
+    assert ending in certificate.words(moved[certificate.corners])
     # No smaller dilatation does: K of the shear is a bound that this bound does not exceed.
     assert least < (1 + shift / 0.15) / (1 - shift / 0.15) - 1 + 1e-9
 

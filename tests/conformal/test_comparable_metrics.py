@@ -32,25 +32,25 @@ def moved(uv, a):
 
 def test_one_affine_map_has_one_beltrami_coefficient_and_no_area_distortion():
     mesh, s = uneven_square(), 3.0
-    found = all_metrics(mesh, 5 * (s * mesh.V[:, 0] + 1j * mesh.V[:, 1]))
-    assert found["beltrami_area_mean"] == pytest.approx((s - 1) / (s + 1))
-    assert found["beltrami_max"] == pytest.approx((s - 1) / (s + 1))
-    assert found["area_distortion_mean"] < 1e-12
-    assert found["area_distortion_sd"] < 1e-12
-    assert found["overlap_share"] == 0
-    assert "common_gauge_energy" not in found  # not a disk
+    metrics = all_metrics(mesh, 5 * (s * mesh.V[:, 0] + 1j * mesh.V[:, 1]))
+    assert metrics["beltrami_area_mean"] == pytest.approx((s - 1) / (s + 1))
+    assert metrics["beltrami_max"] == pytest.approx((s - 1) / (s + 1))
+    assert metrics["area_distortion_mean"] < 1e-12
+    assert metrics["area_distortion_sd"] < 1e-12
+    assert metrics["overlap_share"] == 0
+    assert "common_gauge_energy" not in metrics  # not a disk
 
 
 def test_two_affine_maps_count_by_the_surface_area_not_by_triangles():
     """The left quarter of the area stays, the rest is stretched by e: log ratios of 0 and 1."""
     mesh = uneven_square()
     x, y = mesh.V[:, 0], mesh.V[:, 1]
-    found = all_metrics(mesh, np.where(x > 0.25, 0.25 + np.e * (x - 0.25), x) + 1j * y)
+    metrics = all_metrics(mesh, np.where(x > 0.25, 0.25 + np.e * (x - 0.25), x) + 1j * y)
     mu = (np.e - 1) / (np.e + 1)
-    assert found["beltrami_area_mean"] == pytest.approx(0.75 * mu)
-    assert found["beltrami_max"] == pytest.approx(mu)
-    assert found["area_distortion_mean"] == pytest.approx(2 * 0.25 * 0.75)
-    assert found["area_distortion_sd"] == pytest.approx(np.sqrt(0.25 * 0.75))
+    assert metrics["beltrami_area_mean"] == pytest.approx(0.75 * mu)
+    assert metrics["beltrami_max"] == pytest.approx(mu)
+    assert metrics["area_distortion_mean"] == pytest.approx(2 * 0.25 * 0.75)
+    assert metrics["area_distortion_sd"] == pytest.approx(np.sqrt(0.25 * 0.75))
 
 
 def slow_figures(mesh, uv):
@@ -92,10 +92,10 @@ def test_against_fifty_digits(folds):
     mesh = hemi_ellipsoid(150)
     rng = np.random.default_rng(1)
     uv = 3 * planar(mesh) + (0.5 if folds else 0.02) * rng.standard_normal((mesh.n, 2)) @ [1, 1j]
-    found = all_metrics(mesh, uv)
-    assert bool(found["flipped_triangles"]) == folds
+    metrics = all_metrics(mesh, uv)
+    assert bool(metrics["flipped_triangles"]) == folds
     names = ("beltrami_area_mean", "beltrami_max", "area_distortion_mean", "area_distortion_sd")
-    np.testing.assert_allclose([found[name] for name in names], slow_figures(mesh, uv), rtol=1e-9)
+    np.testing.assert_allclose([metrics[name] for name in names], slow_figures(mesh, uv), rtol=1e-9)
 
 
 @pytest.mark.parametrize("a", [0.1, -0.6 + 0.3j, 0.9j])
@@ -125,27 +125,27 @@ def test_a_moebius_map_changes_the_beltrami_coefficients_by_the_discretisation_a
 
 def test_the_mean_by_area_of_a_centred_disk_is_its_middle():
     mesh = flat_disk(600)
-    found = all_metrics(mesh, moved(planar(mesh), 0.5))
-    assert found["conformal_energy"] > 1e-5
-    assert abs(found["common_gauge_energy"]) < 1e-12  # the identity comes back, but for a turn
+    metrics = all_metrics(mesh, moved(planar(mesh), 0.5))
+    assert metrics["conformal_energy"] > 1e-5
+    assert abs(metrics["common_gauge_energy"]) < 1e-12  # the identity comes back, but for a turn
 
 
 def test_a_disk_that_has_no_common_gauge_says_so():
     mesh = flat_disk(600)
     uv = planar(mesh)
     uv[0] = 5
-    found = all_metrics(mesh, uv)
-    assert found["common_gauge_energy"] == np.inf
-    assert found["area_distortion_sd"] == np.inf
+    metrics = all_metrics(mesh, uv)
+    assert metrics["common_gauge_energy"] == np.inf
+    assert metrics["area_distortion_sd"] == np.inf
 
 
 def test_a_collapsed_triangle_has_mu_1_and_no_area_to_take_the_logarithm_of():
     mesh = DiskMesh.from_arrays(*gallery.flat_rectangle())
     uv = planar(mesh)
     uv[8] = uv[7]
-    found = all_metrics(mesh, uv)
-    assert found["beltrami_max"] == 1
-    assert found["area_distortion_mean"] == np.inf
+    metrics = all_metrics(mesh, uv)
+    assert metrics["beltrami_max"] == 1
+    assert metrics["area_distortion_mean"] == np.inf
 
 
 def spiral(turns, n=200):
@@ -158,15 +158,15 @@ def spiral(turns, n=200):
 @pytest.mark.parametrize("turns", [0.5, 1.25, 1.5, 2.6])
 def test_the_share_of_a_ring_that_is_covered_again(turns):
     mesh, uv = spiral(turns)
-    found = all_metrics(mesh, uv)
-    assert found["flipped_triangles"] == 0
-    assert found["overlap_share"] == pytest.approx(max(turns - 1, 0) / turns, abs=2e-3)
+    metrics = all_metrics(mesh, uv)
+    assert metrics["flipped_triangles"] == 0
+    assert metrics["overlap_share"] == pytest.approx(max(turns - 1, 0) / turns, abs=2e-3)
     corners = np.stack([uv.real, uv.imag], axis=1)[mesh.F]
     union = shapely.union_all(shapely.polygons(corners)).area
-    share = 1 - union / found["image_area"]
-    assert found["overlap_share"] == pytest.approx(share, abs=1e-9)
+    share = 1 - union / metrics["image_area"]
+    assert metrics["overlap_share"] == pytest.approx(share, abs=1e-9)
     mirrored = all_metrics(mesh, uv.conj())["overlap_share"]
-    assert mirrored == pytest.approx(found["overlap_share"], abs=1e-12)
+    assert mirrored == pytest.approx(metrics["overlap_share"], abs=1e-12)
 
 
 def test_a_hole_is_not_covered_and_a_scrambled_boundary_is_not_measured():

@@ -28,10 +28,10 @@ MORE_DISKS = ("nefertiti.obj", "human_brain.obj", "left_hand.obj")
 def check(mesh, algorithm):
     """Whether the map was folded at first, and whether it is at the end."""
     try:
-        found = algorithm(mesh)
+        result = algorithm(mesh)
     except AlgorithmFailed:
         return None
-    after, before = all_metrics(mesh, found.uv), found.extras.get("before_repair")
+    after, before = all_metrics(mesh, result.uv), result.extras.get("before_repair")
     if before is None:
         assert after["flipped_triangles"] == 0
         return False, False
@@ -51,12 +51,12 @@ def test_a_map_without_folds_is_returned_as_it_is():
 
 def test_figures_before_are_recorded_and_those_after_are_the_maps():
     mesh = gallery.crumpled_disk()
-    found = harmonic_circle(mesh)
-    before = found.extras["before_repair"]
+    result = harmonic_circle(mesh)
+    before = result.extras["before_repair"]
     assert set(before) == {"flipped_triangles", "conformal_energy", "angle_error_mean_deg"}
     assert before["flipped_triangles"] == 6
-    assert all_metrics(mesh, found.uv)["flipped_triangles"] == 0
-    assert "refused_repair" not in found.extras
+    assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
+    assert "refused_repair" not in result.extras
 
 
 def test_a_repair_that_costs_too_much_is_refused_and_its_figures_recorded(monkeypatch):
@@ -116,9 +116,9 @@ def test_without_repair_the_map_is_as_the_method_made_it(name):
 def test_the_paper_s_david_head_is_folded_by_every_method(method, mean, sd):
     # Printed: FDM 3.06 5.86, LDM 3.11 5.86, CEM 3.24 5.84. Repaired, SD is 6.03.
     mesh = read_mesh(real_mesh("david_head.obj"))
-    found = method(mesh)
-    figures = all_metrics(mesh, found.uv)
-    assert found.extras["folded_before_repair"] == figures["flipped_triangles"] == 119
+    result = method(mesh)
+    figures = all_metrics(mesh, result.uv)
+    assert result.extras["folded_before_repair"] == figures["flipped_triangles"] == 119
     assert figures["angle_error_mean_deg"] == pytest.approx(mean, abs=6e-4)
     assert figures["angle_error_sd_deg"] == pytest.approx(sd, abs=6e-4)
 
@@ -166,9 +166,9 @@ def test_every_real_disk_by_every_algorithm(algorithm, name):
 
 def test_hippocampus_with_arcs_down_to_rounding_keeps_its_quality():
     mesh = read_mesh(real_mesh("stress/hippocampus_unfoldiso.obj"))
-    found = direct_cem(mesh)
-    figures = all_metrics(mesh, found.uv)
+    result = direct_cem(mesh)
+    figures = all_metrics(mesh, result.uv)
     assert figures["flipped_triangles"] == 0
     assert figures["angle_error_mean_deg"] < 1.3
     assert figures["conformal_energy"] < 0.03
-    assert found.extras["before_repair"]["flipped_triangles"] > 50
+    assert result.extras["before_repair"]["flipped_triangles"] > 50

@@ -27,9 +27,9 @@ def area(lengths):
     "mesh", [hemi_ellipsoid(1500, x=5.0), flat_disk(1500, stretch=6.0), gallery.three_holes(900)]
 )
 def test_the_laplacian_is_that_of_libigl(mesh):
-    found = laplacian(mesh, delaunay=True)
+    weights = laplacian(mesh, delaunay=True)
     reference = -igl.intrinsic_delaunay_cotmatrix(mesh.V, mesh.F)[0]
-    assert abs(found - reference).max() < 1e-12 * abs(reference).max()
+    assert abs(weights - reference).max() < 1e-12 * abs(reference).max()
 
 
 def test_a_stretched_disk_is_triangulated_anew_and_stays_the_same_surface():
@@ -121,10 +121,10 @@ def test_few_obtuse_angles_are_looked_at_alone(monkeypatch, wrong):
     mesh = _with_one_thin_pair(flat_disk(1500), wrong)
     obtuse = (half_cotangents(mesh.V, mesh.F) < 0).mean()
     assert 0 < obtuse < own.FEW
-    found = of(mesh.V, mesh.F)
-    assert (found[0] is mesh.F) == (not wrong)
+    values = of(mesh.V, mesh.F)
+    assert (values[0] is mesh.F) == (not wrong)
     monkeypatch.setattr(own, "FEW", 0.0)
-    for short, long in zip(found, of(mesh.V, mesh.F), strict=True):
+    for short, long in zip(values, of(mesh.V, mesh.F), strict=True):
         np.testing.assert_array_equal(short, long)
 
 

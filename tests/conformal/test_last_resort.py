@@ -33,25 +33,25 @@ def is_valid(mesh, uv):
 @pytest.mark.parametrize("method", TOOLS)
 def test_a_band_too_long_for_doubles_has_a_valid_map_by_every_tool(method):
     mesh = long_band()
-    found = method(mesh)
-    assert is_valid(mesh, found.uv)
-    assert not flipped_triangles(mesh, found.uv)
-    assert found.extras["last_resort"]["moved_boundary_vertices"] > 0
+    result = method(mesh)
+    assert is_valid(mesh, result.uv)
+    assert not flipped_triangles(mesh, result.uv)
+    assert result.extras["last_resort"]["moved_boundary_vertices"] > 0
 
 
 @pytest.mark.parametrize("method", TOOLS)
 def test_without_interior_vertices_the_boundary_is_all_of_the_map(method):
     mesh = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 5))
-    found = method(mesh)
-    assert is_valid(mesh, found.uv)
-    assert not flipped_triangles(mesh, found.uv)
+    result = method(mesh)
+    assert is_valid(mesh, result.uv)
+    assert not flipped_triangles(mesh, result.uv)
 
 
 def test_an_own_failure_is_recorded_and_told():
     mesh = long_band()
-    found = bff(mesh)
-    assert "too crowded" in found.extras["failure"]
-    note = quality_notes("disk", MapFigures(mesh, found.uv), found.extras)[0]
+    result = bff(mesh)
+    assert "too crowded" in result.extras["failure"]
+    note = quality_notes("disk", MapFigures(mesh, result.uv), result.extras)[0]
     assert note.kind is NoticeKind.LAST_RESORT
     assert "too crowded" in note.text
     assert "abf-linear" in note.text

@@ -31,15 +31,15 @@ def planar(mesh):
 
 def test_a_flat_disk_maps_to_itself_without_any_distortion():
     mesh = flat_disk(600)
-    found = all_metrics(mesh, planar(mesh))
+    metrics = all_metrics(mesh, planar(mesh))
     rim = len(mesh.boundary)
-    assert found["image_area"] == pytest.approx(rim / 2 * np.sin(2 * np.pi / rim))
-    assert found["dirichlet_energy"] == pytest.approx(found["image_area"], rel=1e-12)
-    assert abs(found["conformal_energy"]) < 1e-12
-    assert found["angle_error_mean_deg"] < 1e-10
-    assert found["flipped_triangles"] == 0
-    assert found["dilatation_max"] == pytest.approx(1, abs=1e-10)
-    assert found["boundary_circularity"] < 1e-12
+    assert metrics["image_area"] == pytest.approx(rim / 2 * np.sin(2 * np.pi / rim))
+    assert metrics["dirichlet_energy"] == pytest.approx(metrics["image_area"], rel=1e-12)
+    assert abs(metrics["conformal_energy"]) < 1e-12
+    assert metrics["angle_error_mean_deg"] < 1e-10
+    assert metrics["flipped_triangles"] == 0
+    assert metrics["dilatation_max"] == pytest.approx(1, abs=1e-10)
+    assert metrics["boundary_circularity"] < 1e-12
 
 
 def test_a_stretched_square_in_closed_form():
@@ -48,40 +48,40 @@ def test_a_stretched_square_in_closed_form():
     i, j, F = gallery.grid(6, 6)
     mesh = DiskMesh.from_arrays(np.stack([j / 6, i / 6, 0 * i], 1), F)
     s = 3.0
-    found = all_metrics(mesh, s * mesh.V[:, 0] + 1j * mesh.V[:, 1])
-    assert found["dirichlet_energy"] == pytest.approx((s**2 + 1) / 2)
-    assert found["image_area"] == pytest.approx(s)
-    assert found["conformal_energy"] == pytest.approx((s - 1) ** 2 / 2)
-    assert found["dilatation_mean"] == pytest.approx(s)
-    assert found["dilatation_max"] == pytest.approx(s)
+    metrics = all_metrics(mesh, s * mesh.V[:, 0] + 1j * mesh.V[:, 1])
+    assert metrics["dirichlet_energy"] == pytest.approx((s**2 + 1) / 2)
+    assert metrics["image_area"] == pytest.approx(s)
+    assert metrics["conformal_energy"] == pytest.approx((s - 1) ** 2 / 2)
+    assert metrics["dilatation_mean"] == pytest.approx(s)
+    assert metrics["dilatation_max"] == pytest.approx(s)
     off = 45 - np.rad2deg(np.arctan(1 / s))
-    assert found["angle_error_mean_deg"] == pytest.approx(2 * off / 3)
-    assert found["angle_error_sd_deg"] == pytest.approx(off * np.sqrt(2) / 3)
+    assert metrics["angle_error_mean_deg"] == pytest.approx(2 * off / 3)
+    assert metrics["angle_error_sd_deg"] == pytest.approx(off * np.sqrt(2) / 3)
     # Fitted to a rectangle, the circle through nothing: far from circular, yet finite.
-    assert 0.1 < found["boundary_circularity"] < 1
+    assert 0.1 < metrics["boundary_circularity"] < 1
 
 
 def test_a_folded_vertex_is_counted_and_a_collapsed_triangle_is_infinite():
     mesh = flat_disk(600)
     uv = planar(mesh)
     uv[0] = 5  # the middle vertex, outside the disk: some of its six triangles turn over
-    found = all_metrics(mesh, uv)
-    assert 0 < found["flipped_triangles"] < 6
+    metrics = all_metrics(mesh, uv)
+    assert 0 < metrics["flipped_triangles"] < 6
     mesh = DiskMesh.from_arrays(*gallery.flat_rectangle())
     uv = planar(mesh)
     uv[8] = uv[7]  # an edge of two triangles becomes a point
-    found = all_metrics(mesh, uv)
-    assert found["flipped_triangles"] == 2
-    assert found["dilatation_max"] == np.inf
-    assert np.isfinite(found["angle_error_mean_deg"])
+    metrics = all_metrics(mesh, uv)
+    assert metrics["flipped_triangles"] == 2
+    assert metrics["dilatation_max"] == np.inf
+    assert np.isfinite(metrics["angle_error_mean_deg"])
 
 
 def test_a_mirror_image_is_all_flipped_and_as_conformal():
     mesh = flat_disk(600)
-    found = all_metrics(mesh, np.conj(planar(mesh)))
-    assert found["flipped_triangles"] == mesh.m
-    assert found["image_area"] < 0
-    assert found["angle_error_mean_deg"] < 1e-10
+    metrics = all_metrics(mesh, np.conj(planar(mesh)))
+    assert metrics["flipped_triangles"] == mesh.m
+    assert metrics["image_area"] < 0
+    assert metrics["angle_error_mean_deg"] < 1e-10
 
 
 def test_angles_of_slivers_are_accurate():
@@ -131,9 +131,9 @@ def test_round_holes_are_found_with_centre_and_radius_and_leave_the_area():
         n / 2 * np.sin(2 * np.pi / n) * r**2
         for n, r in [(c.vertices, c.radius) for c in (outer, *holes)]
     ]
-    found = all_metrics(mesh, uv)
-    assert found["image_area"] == pytest.approx(polygons[0] - sum(polygons[1:]))
-    assert abs(found["conformal_energy"]) < 1e-12
+    metrics = all_metrics(mesh, uv)
+    assert metrics["image_area"] == pytest.approx(polygons[0] - sum(polygons[1:]))
+    assert abs(metrics["conformal_energy"]) < 1e-12
 
 
 def test_circularity_of_an_ellipse_and_of_a_point():
@@ -173,8 +173,8 @@ def test_every_metric_says_how_it_is_shown():
 
 def test_a_record_holds_every_metric_of_the_table_in_its_order():
     mesh = flat_disk(60)
-    found = all_metrics(mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1])
-    assert list(found) == [metric.name for metric in METRICS]
+    metrics = all_metrics(mesh, mesh.V[:, 0] + 1j * mesh.V[:, 1])
+    assert list(metrics) == [metric.name for metric in METRICS]
 
 
 def test_the_page_of_metrics_has_their_table():
@@ -187,8 +187,8 @@ def test_dilatations_of_slivers_are_those_of_the_stretch(thin):
     """A strip flattened by a factor, mapped to where it came from: 1 / thin everywhere."""
     V, F = gallery.flat_rectangle()
     mesh = DiskMesh.from_arrays(V * [1, thin, 1], F)
-    found = dilatations(mesh, V[:, 0] + 1j * V[:, 1])
-    np.testing.assert_allclose(found, 1 / thin, rtol=1e-9)
+    dilatation = dilatations(mesh, V[:, 0] + 1j * V[:, 1])
+    np.testing.assert_allclose(dilatation, 1 / thin, rtol=1e-9)
     np.testing.assert_allclose(dilatations(mesh, planar(mesh)), 1, rtol=1e-6)
 
 

@@ -19,8 +19,8 @@ def test_three_points_go_where_they_are_sent(z):
 
 def test_three_points_determine_the_map(z):
     known = Moebius(1 + 1j, 2, 0.3j, 1 - 0.5j)
-    found = three_point_map(z[:3], known(z[:3]))
-    np.testing.assert_allclose(found(z), known(z), rtol=1e-10)
+    moebius = three_point_map(z[:3], known(z[:3]))
+    np.testing.assert_allclose(moebius(z), known(z), rtol=1e-10)
 
 
 def test_circles_stay_circles():

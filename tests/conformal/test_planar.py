@@ -95,16 +95,16 @@ def test_polygons_that_cross_are_found(curves, answer):
 
 def test_crossings_agree_with_trying_every_pair():
     rng = np.random.default_rng(5)
-    found = set()
+    inside = set()
     for _ in range(60):
         curves = [
             complex(*rng.uniform(-2, 2, 2)) + rng.uniform(0.1, 1) * ring(9) * np.exp(1j * turn)
             for turn in rng.uniform(0, 6, 3)
         ]
         expected = any(_polygons_cross(a, b) for k, a in enumerate(curves) for b in curves[:k])
-        found.add(expected)
+        inside.add(expected)
         assert (crossing_polygons(curves) is not None) == expected
-    assert found == {True, False}
+    assert inside == {True, False}
 
 
 def _polygons_cross(a, b):

@@ -63,12 +63,12 @@ SURFACES = {
 def test_the_map_is_that_of_algorithm_1_as_printed(ring, surface, inversion):
     mesh = SURFACES[surface]()
     options = {"inversion": inversion, "max_iterations": 5}
-    found = cem(mesh, **options)
+    result = cem(mesh, **options)
     with linear_algebra("backslash"):
         printed = cem(mesh, **options)
-    assert abs(found.uv - printed.uv).max() < 1e-11
-    assert found.iterations == printed.iterations
-    np.testing.assert_allclose(found.energy_history, printed.energy_history, atol=1e-11)
+    assert abs(result.uv - printed.uv).max() < 1e-11
+    assert result.iterations == printed.iterations
+    np.testing.assert_allclose(result.energy_history, printed.energy_history, atol=1e-11)
 
 
 def test_the_iterate_of_least_energy_has_its_own_interior(ring):

@@ -15,10 +15,10 @@ from cembench.core.errors import CembenchError
 
 def test_an_even_map_has_one_density_and_no_part_without_texels():
     disk = cembench.surface("flat-disk", 600)
-    found = all_metrics(disk, disk.V[:, 0] + 1j * disk.V[:, 1])
-    assert found["texel_density_ratio"] == pytest.approx(1)
-    assert found["undersampled_share"] == 0
-    assert texture_words(found) == "texel density varies 1 : 1"
+    metrics = all_metrics(disk, disk.V[:, 0] + 1j * disk.V[:, 1])
+    assert metrics["texel_density_ratio"] == pytest.approx(1)
+    assert metrics["undersampled_share"] == 0
+    assert texture_words(metrics) == "texel density varies 1 : 1"
 
 
 def test_a_hundredth_at_either_end_does_not_count():
@@ -60,9 +60,9 @@ def test_more_than_a_hundredth_collapsed_has_no_bound():
 
 def test_a_map_that_collapsed_to_a_point_has_no_texel():
     disk = cembench.surface("flat-disk", 200)
-    found = all_metrics(disk, np.full(disk.n, 0.3 + 0.1j))
-    assert found["texel_density_ratio"] == np.inf
-    assert found["undersampled_share"] == 1
+    metrics = all_metrics(disk, np.full(disk.n, 0.3 + 0.1j))
+    assert metrics["texel_density_ratio"] == np.inf
+    assert metrics["undersampled_share"] == 1
 
 
 @pytest.mark.parametrize("metrics", [{}, {"conformal_energy": 1.0}])

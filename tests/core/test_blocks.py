@@ -9,16 +9,16 @@ from cembench.core import blocks
 
 def test_blocks_cover_all_rows_once():
     for rows in (0, 1, blocks.ROWS, blocks.ROWS + 1, 3 * blocks.ROWS):
-        found = [k for part in blocks.blocks(rows) for k in range(rows)[part]]
-        assert found == list(range(rows))
+        items = [k for part in blocks.blocks(rows) for k in range(rows)[part]]
+        assert items == list(range(rows))
 
 
 @pytest.mark.parametrize("rows", [0, 1, 6, 7, 8, 20])
 def test_a_function_of_rows_is_the_same_in_blocks(monkeypatch, rows):
     monkeypatch.setattr(blocks, "ROWS", 7)
-    given = np.arange(3.0 * rows).reshape(rows, 3)
-    found = blocks.in_blocks(lambda some: some @ [1.0, 2.0, 3.0], given)
-    np.testing.assert_array_equal(found, given @ [1.0, 2.0, 3.0])
+    matrix = np.arange(3.0 * rows).reshape(rows, 3)
+    blockwise = blocks.in_blocks(lambda some: some @ [1.0, 2.0, 3.0], matrix)
+    np.testing.assert_array_equal(blockwise, matrix @ [1.0, 2.0, 3.0])
 
 
 def test_figures_of_a_map_do_not_depend_on_the_blocks(monkeypatch):

@@ -63,9 +63,9 @@ def test_a_name_made_to_look_like_a_cleaned_one_is_another():
 
 @given(st.lists(NAMES, unique=True))
 def test_slugs_are_distinct_and_bounded_without_regard_to_case(names):
-    found = distinct_slugs({f"{k:08x}": name for k, name in enumerate(names)})
-    assert len(set(found.values())) == len(names)
-    assert all(len(one) <= 120 and one == slug(one, 120) for one in found.values())
+    slugs = distinct_slugs({f"{k:08x}": name for k, name in enumerate(names)})
+    assert len(set(slugs.values())) == len(names)
+    assert all(len(one) <= 120 and one == slug(one, 120) for one in slugs.values())
 
 
 def test_a_slug_made_to_look_like_another_is_told_apart():

@@ -44,11 +44,11 @@ def test_paths_are_strings_of_a_functions_code_whatever_they_are_called(tmp_path
         {"input": f"/in/{name}", "output": f"/out/{name}", "threads": "1"}
     )
     code = words[-1]
-    found = []
+    collected = []
     for before in ("addpath(", "load(", "save('-v7', "):
         text, code = value_of(code[code.index(before) + len(before) :])
-        found.append(text)
-    assert found == [str(folder), f"/in/{name}", f"/out/{name}"]
+        collected.append(text)
+    assert collected == [str(folder), f"/in/{name}", f"/out/{name}"]
     assert code == ", 'uv');"
 
 

@@ -27,9 +27,9 @@ def rows(heading):
     """The first column of the table below a heading of the page of errors."""
     page = (DOCS / "errors.md").read_text()
     section = page.split(f"## {heading}\n")[1].split("\n## ")[0]
-    found = re.findall(r"^\| (.+?) \| (.+?) \| (.+?) \|$", section, re.MULTILINE)
-    assert len(found) > 3
-    return [first.strip("`") for first, *_ in found[1:]]
+    matches = re.findall(r"^\| (.+?) \| (.+?) \| (.+?) \|$", section, re.MULTILINE)
+    assert len(matches) > 3
+    return [first.strip("`") for first, *_ in matches[1:]]
 
 
 @pytest.mark.parametrize(

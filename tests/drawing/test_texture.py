@@ -29,14 +29,14 @@ def test_the_same_coordinates_give_the_same_texture():
 
 def test_a_quarter_turn_turns_the_texture():
     turned = np.stack([1 - SQUARE[..., 1], SQUARE[..., 0]], axis=2)
-    found = painted(slope(64), SQUARE, turned)
-    np.testing.assert_array_equal(found, np.rot90(np.asarray(slope(64))))
+    picture = painted(slope(64), SQUARE, turned)
+    np.testing.assert_array_equal(picture, np.rot90(np.asarray(slope(64))))
 
 
 def test_a_smaller_map_repeats_its_rim_outside():
-    found = painted(slope(64), SQUARE, 0.25 + SQUARE / 2)
-    np.testing.assert_allclose(found[32, 16:48, 0], 255 * (np.arange(32) + 0.5) / 32, atol=2.5)
-    assert (found[32, :16] == found[32, 16]).all()
+    picture = painted(slope(64), SQUARE, 0.25 + SQUARE / 2)
+    np.testing.assert_allclose(picture[32, 16:48, 0], 255 * (np.arange(32) + 0.5) / 32, atol=2.5)
+    assert (picture[32, :16] == picture[32, 16]).all()
 
 
 def test_coordinates_outside_the_square_repeat_the_texture():

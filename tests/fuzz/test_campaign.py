@@ -22,18 +22,18 @@ def shown(entries):
 
 @pytest.mark.parametrize("family", FILE_FAMILIES)
 def test_no_mutated_file_of_a_format_makes_a_fault(family, tried):
-    found = [e for e in tried if e.part == "files" and e.family == family]
-    assert len(found) in (33, 34)  # 300 over nine families
-    assert not shown(found), shown(found)
+    items = [e for e in tried if e.part == "files" and e.family == family]
+    assert len(items) in (33, 34)  # 300 over nine families
+    assert not shown(items), shown(items)
 
 
 @pytest.mark.parametrize("algorithm", project.algorithms())
 def test_no_hard_mesh_makes_a_fault(algorithm, tried):
-    found = [e for e in tried if e.part == "meshes" and e.case.endswith(f"/{algorithm}")]
+    items = [e for e in tried if e.part == "meshes" and e.case.endswith(f"/{algorithm}")]
     taken = {name for k, name in enumerate(MESH_FAMILIES) if takes(k, algorithm)}
-    assert {e.family for e in found} == taken
-    assert any(e.outcome == "ok" for e in found)
-    assert not shown(found), shown(found)
+    assert {e.family for e in items} == taken
+    assert any(e.outcome == "ok" for e in items)
+    assert not shown(items), shown(items)
 
 
 @pytest.mark.slow

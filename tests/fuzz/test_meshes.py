@@ -88,8 +88,8 @@ def circle(vertices=12):
 def test_each_fault_of_a_disk_is_found(change, words):
     F, uv = circle()
     assert faults(F, uv) == []
-    found = "; ".join(faults(F, change(uv)))
-    assert any(word in found for word in words.split("|")), found
+    joined = "; ".join(faults(F, change(uv)))
+    assert any(word in joined for word in words.split("|")), joined
 
 
 def test_holes_that_cross_or_lie_outside_are_found():

@@ -17,13 +17,13 @@ def A():
 @pytest.mark.parametrize("k", [40, 39, 7, 1])
 def test_it_is_the_lower_triangle_of_the_permuted_matrix(A, k):
     order = np.random.default_rng(1).permutation(40)[:k]
-    found = permuted_lower(A, order)
+    lower = permuted_lower(A, order)
     expected = A.toarray()[np.ix_(order, order)]
-    np.testing.assert_array_equal(found.toarray(), np.tril(expected))
-    np.testing.assert_array_equal(both_triangles(found).toarray(), expected)
+    np.testing.assert_array_equal(lower.toarray(), np.tril(expected))
+    np.testing.assert_array_equal(both_triangles(lower).toarray(), expected)
     for c in range(k):
-        assert (np.diff(found.indices[found.indptr[c] : found.indptr[c + 1]]) > 0).all()
-    assert found.indices.dtype == np.int32
+        assert (np.diff(lower.indices[lower.indptr[c] : lower.indptr[c + 1]]) > 0).all()
+    assert lower.indices.dtype == np.int32
 
 
 @pytest.mark.parametrize("backend", available_backends())

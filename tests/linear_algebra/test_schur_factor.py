@@ -61,8 +61,8 @@ def test_what_stands_behind_the_leading_block_is_that_of_the_whole_solution(
     A, k = system
     b = np.random.default_rng(0).standard_normal((len(A.toarray()), 2)) @ [1, 1j]
     with linear_algebra(solves, backend):
-        found = Cholesky(A, leading=k).solve_trailing(b)
-    np.testing.assert_allclose(found, np.linalg.solve(A.toarray(), b)[k:], atol=1e-11)
+        solved = Cholesky(A, leading=k).solve_trailing(b)
+    np.testing.assert_allclose(solved, np.linalg.solve(A.toarray(), b)[k:], atol=1e-11)
 
 
 def test_the_factor_shows_it_without_a_solve(system, count_calls):
@@ -91,8 +91,8 @@ def test_a_leading_block_in_several_pieces_is_solved_with(backend):
     A, k = pinned(two_squares_joined_by_a_strip())
     right = np.random.default_rng(0).standard_normal((k, 2))
     with linear_algebra(backend=backend):
-        found = Cholesky(A, leading=k).solve_leading(right)
-    np.testing.assert_allclose(A[:k, :k] @ found, right, atol=1e-12)
+        solved = Cholesky(A, leading=k).solve_leading(right)
+    np.testing.assert_allclose(A[:k, :k] @ solved, right, atol=1e-12)
 
 
 def test_an_indefinite_schur_complement_is_refused():
@@ -185,6 +185,6 @@ def test_direct_cem_minimises_the_same_energy_without_the_dense_factor(monkeypat
     expected = direct_cem(mesh)
     for module in (cholesky, bordered):
         monkeypatch.setattr(module, "LARGEST_DENSE", 1)
-    found = direct_cem(mesh)
-    np.testing.assert_allclose(found.energy_history, expected.energy_history, rtol=1e-9)
-    np.testing.assert_allclose(found.uv, expected.uv, atol=1e-6)
+    result = direct_cem(mesh)
+    np.testing.assert_allclose(result.energy_history, expected.energy_history, rtol=1e-9)
+    np.testing.assert_allclose(result.uv, expected.uv, atol=1e-6)

@@ -144,15 +144,17 @@ def test_bad_files_are_told_the_rest_is_done_and_the_next_call_resumes(cli, serv
     threading.Timer(1.0, slow.set).start()  # and one that is slow to come
     code, out, err = cli("fetch", "--group", "disks", "--json")
     assert code == 1
-    found = {about["name"]: about for about in json.loads(out)}
-    assert [name for name in found if "error" in found[name]] == [f"mesh0{k}" for k in range(1, 5)]
+    by_key = {about["name"]: about for about in json.loads(out)}
+    assert [name for name in by_key if "error" in by_key[name]] == [
+        f"mesh0{k}" for k in range(1, 5)
+    ]
     for k in (1, 2):
-        assert "SHA-256" in found[f"mesh0{k}"]["error"]
-    assert "404" in found["mesh04"]["error"]
+        assert "SHA-256" in by_key[f"mesh0{k}"]["error"]
+    assert "404" in by_key["mesh04"]["error"]
     for k in range(1, 5):
         assert f"mesh0{k}.obj from http://127.0.0.1" in " ".join(err.split())
     assert sum(is_fetched(d) for d in datasets) == 44
-    assert found["mesh07"]["fetched"]
+    assert by_key["mesh07"]["fetched"]
     left = {p.name for p in datasets[0].path.parent.iterdir()}
     assert left == {d.file for d in datasets} - {f"mesh0{k}.obj" for k in range(1, 5)}
 

@@ -202,8 +202,8 @@ def test_a_model_is_recognised_by_its_mesh_in_any_file(tiny, known, server, tmp_
     mesh = read_mesh(path)
     write_mesh(tmp_path / "other.ply", mesh)
     for file in (path, tmp_path / "other.ply"):
-        found = provenance_of(load_registry(), read_mesh(file))
-        assert found == Provenance("Nefertiti", "model")
+        provenance = provenance_of(load_registry(), read_mesh(file))
+        assert provenance == Provenance("Nefertiti", "model")
     unknown = replace(load_registry(), datasets={"tiny": tiny})
     assert provenance_of(unknown, mesh) == Provenance()
 
@@ -211,9 +211,9 @@ def test_a_model_is_recognised_by_its_mesh_in_any_file(tiny, known, server, tmp_
 @pytest.mark.parametrize("name", ["chinese_lion.mat", "chinese_lion.obj"])
 def test_the_chinese_lion_is_recognised_in_either_format(name):
     path = real_mesh(name)
-    found = provenance_of(load_registry(), read_mesh(path, TriangleMesh))
+    provenance = provenance_of(load_registry(), read_mesh(path, TriangleMesh))
     source = "garyptchoi/disk-conformal-map"
-    assert found == Provenance("Chinese Lion", "model", source, "chinese-lion")
+    assert provenance == Provenance("Chinese Lion", "model", source, "chinese-lion")
 
 
 def test_fetch_lists_what_there_is(cli, known):
@@ -270,8 +270,8 @@ def test_fetch_of_an_unknown_name_fetches_nothing(cli, known, server):
 def test_map_takes_the_name_of_a_dataset(cli, known, server):
     code, out, _ = cli("map", "tiny", "--json")
     assert code == 0
-    found = json.loads(out)
-    assert (found["origin"], found["paper_row"]) == ("model", "Nefertiti")
+    data = json.loads(out)
+    assert (data["origin"], data["paper_row"]) == ("model", "Nefertiti")
     shown = " ".join(cli("map", "tiny", "-a", "cem")[1].split())
     assert "it is Nefertiti; printed: E_C 0.0278, mean angle error 2.65" in shown
     assert server.requests == 1

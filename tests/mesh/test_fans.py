@@ -45,9 +45,9 @@ def test_vertices_merged_at_random(seed):
             neighbours[i] |= neighbours[j]
             merged += 1
     F = number[mesh.F]
-    found = vertices_of_several_fans(F, mesh.n)
-    np.testing.assert_array_equal(found, several_fans(F, mesh.n))
-    assert len(found) >= 1
+    pinched = vertices_of_several_fans(F, mesh.n)
+    np.testing.assert_array_equal(pinched, several_fans(F, mesh.n))
+    assert len(pinched) >= 1
 
 
 def test_a_fan_of_many_triangles():

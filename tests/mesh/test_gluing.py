@@ -45,7 +45,7 @@ def test_partners_have_the_same_ends_however_full_the_table_is(monkeypatch, slot
     edges = np.random.default_rng(0).permutation(topology.half_edges(gallery.three_holes(300).F))
     if some_turned:
         edges[::3] = edges[::3, ::-1]
-    found = partners(*edges.T)
+    glued = partners(*edges.T)
     ends = [frozenset(edge) for edge in edges.tolist()]
     others = {}
     for k, edge in enumerate(ends):
@@ -53,7 +53,7 @@ def test_partners_have_the_same_ends_however_full_the_table_is(monkeypatch, slot
     expected = [
         sum(others[edge]) - k if len(others[edge]) == 2 else -1 for k, edge in enumerate(ends)
     ]
-    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(glued, expected)
 
 
 def test_no_edges_have_no_partners():

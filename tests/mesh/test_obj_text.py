@@ -105,9 +105,9 @@ def test_another_reader_finds_the_uvs_of_a_cut_surface_on_the_uncut_one(compose)
     )
     expected = np.stack([mesh.F, cut.mesh.F], axis=2)
     np.testing.assert_array_equal(corners_of(text), expected)
-    found = trimesh.load_mesh(io.StringIO(text), file_type="obj", process=False)
-    np.testing.assert_allclose(found.vertices[found.faces], mesh.V[mesh.F], atol=1e-8)
-    z = found.visual.uv[found.faces] @ [1, 1j]
+    loaded = trimesh.load_mesh(io.StringIO(text), file_type="obj", process=False)
+    np.testing.assert_allclose(loaded.vertices[loaded.faces], mesh.V[mesh.F], atol=1e-8)
+    z = loaded.visual.uv[loaded.faces] @ [1, 1j]
     np.testing.assert_allclose(z, uv[cut.mesh.F], atol=1e-8)
 
 

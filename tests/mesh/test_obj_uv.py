@@ -15,9 +15,9 @@ def read(folder, text, F):
 
 def test_polygons_relative_indices_and_seams(tmp_path):
     text = POINTS + TEXTURE + "f 1/1 2/2/9 3/3 4/4\nf -4/-5 -2/-3 -3/5\n"
-    found = read(tmp_path, text, [[0, 1, 2], [0, 2, 3], [2, 1, 0]])
+    surface = read(tmp_path, text, [[0, 1, 2], [0, 2, 3], [2, 1, 0]])
     np.testing.assert_array_equal(
-        found, [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]], [[1, 1], [0.5, 0], [0, 0]]]
+        surface, [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [0, 1]], [[1, 1], [0.5, 0], [0, 0]]]
     )
 
 

@@ -45,22 +45,22 @@ def test_a_seam_stays_open_beside_degenerate_triangles_and_isolated_vertices():
     i, j, k = disk.F[0]
     V = np.concatenate([disk.V, disk.V[[i, j]].mean(axis=0, keepdims=True), [[9, 9, 9]]])
     F = np.concatenate([disk.F[1:], [[i, disk.n, k], [disk.n, j, k], [i, j, disk.n]]])
-    found = repair(V, F)
-    assert found.counts["vertices_welded"] == 0
-    assert found.counts["isolated_vertices_removed"] == 1
+    result = repair(V, F)
+    assert result.counts["vertices_welded"] == 0
+    assert result.counts["isolated_vertices_removed"] == 1
 
 
 def test_a_seam_is_welded_on_request():
     disk = cut_open(sphere()).mesh
-    found = repair(disk.V, disk.F, weld=0.0)
-    assert found.counts["vertices_welded"] == disk.n - sphere().n
-    assert len(found.surfaces[0][0]) == sphere().n
+    result = repair(disk.V, disk.F, weld=0.0)
+    assert result.counts["vertices_welded"] == disk.n - sphere().n
+    assert len(result.surfaces[0][0]) == sphere().n
 
 
 def test_triangles_that_share_no_vertices_are_welded():
     V, F = gallery.flat_rectangle(3, 4)
-    found = repair(V[F].reshape(-1, 3), np.arange(F.size).reshape(-1, 3))
-    assert found.counts["vertices_welded"] == F.size - len(V)
+    result = repair(V[F].reshape(-1, 3), np.arange(F.size).reshape(-1, 3))
+    assert result.counts["vertices_welded"] == F.size - len(V)
 
 
 def rescaled(V):

@@ -26,8 +26,8 @@ def reference_loops(F):
 )
 def test_loops_agree_with_the_obvious_way(surface):
     V, F = surface()
-    found = [loop.tolist() for loop in topology.boundary_loops(F, len(V))]
-    assert found == reference_loops(F)
+    items = [loop.tolist() for loop in topology.boundary_loops(F, len(V))]
+    assert items == reference_loops(F)
 
 
 @settings(max_examples=40, deadline=None)

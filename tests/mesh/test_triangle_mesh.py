@@ -104,8 +104,8 @@ def test_definition_1_of_ragged_disks_as_by_its_words():
         pieces, _ = connected_components(graph[inside][:, inside])
         ears = (graph[~inside][:, inside].sum(axis=1) == 0).any()
         seen.append((pieces > 1, bool(ears)))
-        told = " ".join(notice.text for notice in disk.notices)
-        assert ("pieces, not one" in told, "(iv) broken" in told) == seen[-1]
+        message = " ".join(notice.text for notice in disk.notices)
+        assert ("pieces, not one" in message, "(iv) broken" in message) == seen[-1]
     assert {(False, False), (False, True)} <= set(seen)
 
 

@@ -122,13 +122,13 @@ def test_an_expression_that_cannot_be_made(expression, message):
 def test_landmarks_are_found_on_every_part_and_size():
     for faces in (28_068, 3_000):
         mesh = ict_face(faces, part="narrow")
-        found = landmarks(mesh)
-        assert list(found) == list(LANDMARKS)
-        assert len(set(found.values())) == len(LANDMARKS)
-        assert not set(found.values()) & set(np.concatenate(mesh.loops).tolist())
-        nose = mesh.V[found["nose_tip"]]
+        placed = landmarks(mesh)
+        assert list(placed) == list(LANDMARKS)
+        assert len(set(placed.values())) == len(LANDMARKS)
+        assert not set(placed.values()) & set(np.concatenate(mesh.loops).tolist())
+        nose = mesh.V[placed["nose_tip"]]
         assert nose[2] > np.quantile(mesh.V[:, 2], 0.99)
-        assert mesh.V[found["eye_outer_right"], 0] < 0 < mesh.V[found["eye_outer_left"], 0]
+        assert mesh.V[placed["eye_outer_right"], 0] < 0 < mesh.V[placed["eye_outer_left"], 0]
 
 
 def test_landmarks_of_another_surface_are_refused():

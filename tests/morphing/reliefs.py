@@ -34,6 +34,6 @@ def three():
             places, (2500, 2000, 3000), ("smile", "calm", "wry"), strict=True
         )
     ]
-    found = [vertices_of(mesh, at) for mesh, at in zip(meshes, places, strict=True)]
-    rows = [[vertices[key] for vertices in found] for key in NEUTRAL]
+    items = [vertices_of(mesh, at) for mesh, at in zip(meshes, places, strict=True)]
+    rows = [[vertices[key] for vertices in items] for key in NEUTRAL]
     return meshes, [cem(mesh).uv for mesh in meshes], Landmarks(tuple(NEUTRAL), np.array(rows))

@@ -68,9 +68,9 @@ def test_curvature_aligns_two_meshes_of_one_surface(face):
     mesh, z, _ = face
     other = relief(SMILE, faces=1500)
     reference = centred(mesh, z, NONE)
-    found = aligned(other, to_centre(0.3j, 1.0)(cem(other).uv), NONE, mesh, reference, NONE)
+    turned = aligned(other, to_centre(0.3j, 1.0)(cem(other).uv), NONE, mesh, reference, NONE)
     there, here = (list(vertices_of(m, SMILE).values()) for m in (other, mesh))
-    assert np.abs(found[there] - reference[here]).max() < 0.06
+    assert np.abs(turned[there] - reference[here]).max() < 0.06
 
 
 def test_a_triangle_that_a_moebius_map_folds_is_laid_flat():

@@ -19,9 +19,9 @@ def read(text, tmp_path):
 
 
 def test_a_file_has_indices_names_remarks_and_a_heading(tmp_path):
-    found = read(GOOD, tmp_path)
-    assert found.names == ("nose", "eye")
-    assert found.vertices.tolist() == [
+    surface = read(GOOD, tmp_path)
+    assert surface.names == ("nose", "eye")
+    assert surface.vertices.tolist() == [
         [INSIDE[0][0], INSIDE[1][0]],
         [INSIDE[0][1], INSIDE[1][5]],
     ]
@@ -60,9 +60,9 @@ def test_names_that_all_surfaces_have_are_common():
         {"nose": int(INSIDE[0][0]), "ear": int(INSIDE[0][1])},
         {"chin": int(INSIDE[1][3]), "nose": int(INSIDE[1][4])},
     ]
-    found = common_landmarks(MESHES, known)
-    assert found.names == ("nose",)
-    assert found.vertices.tolist() == [[INSIDE[0][0], INSIDE[1][4]]]
+    common = common_landmarks(MESHES, known)
+    assert common.names == ("nose",)
+    assert common.vertices.tolist() == [[INSIDE[0][0], INSIDE[1][4]]]
     assert len(common_landmarks(MESHES, [{}, {}])) == 0
 
 

@@ -89,9 +89,9 @@ def test_a_pose_removes_how_the_target_stands(reliefs):
 def test_without_landmarks_curvature_brings_the_noses_near(reliefs):
     meshes, maps, landmarks = reliefs
     none = Landmarks((), np.empty((0, 2), dtype=np.int64))
-    found = morph(meshes[:2], maps[:2], none)
+    result = morph(meshes[:2], maps[:2], none)
     nose = landmarks.vertices[0]
-    off = found.carried[1][nose[0]] - meshes[1].V[nose[1]]
+    off = result.carried[1][nose[0]] - meshes[1].V[nose[1]]
     assert np.linalg.norm(off) < 0.15
 
 

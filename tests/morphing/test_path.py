@@ -72,7 +72,7 @@ def test_a_surface_that_stands_elsewhere_is_brought_back(scale):
 
 def test_a_pose_is_never_a_mirror_image():
     mirrored = A * [-1, 1, 1]
-    found = pose_of(mirrored, A, np.ones(len(A)), scale=False)
+    pose = pose_of(mirrored, A, np.ones(len(A)), scale=False)
     corners = np.vstack([np.zeros(3), np.eye(3)])
-    image = found(corners)
+    image = pose(corners)
     assert np.linalg.det(image[1:] - image[0]) == pytest.approx(1)

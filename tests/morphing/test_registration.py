@@ -24,21 +24,21 @@ def test_with_radius_zero_it_is_the_minimiser_of_the_registration_energy(face):
     """(34) to the letter: its gradient vanishes at every vertex inside."""
     mesh, z, landmarks = face
     targets, lam = z[landmarks] + 0.01, 0.3
-    found = register(mesh, z, landmarks, targets, lam=lam, reach=0.0)
-    assert found.lambdas == (lam,)
-    gradient = laplacian(mesh) @ found.uv
-    gradient[landmarks] += 2 * lam * (found.uv[landmarks] - targets)
+    registration = register(mesh, z, landmarks, targets, lam=lam, reach=0.0)
+    assert registration.lambdas == (lam,)
+    gradient = laplacian(mesh) @ registration.uv
+    gradient[landmarks] += 2 * lam * (registration.uv[landmarks] - targets)
     assert np.abs(gradient[mesh.interior]).max() < 1e-10
-    np.testing.assert_array_equal(found.uv[mesh.boundary], z[mesh.boundary])
+    np.testing.assert_array_equal(registration.uv[mesh.boundary], z[mesh.boundary])
 
 
 def test_it_is_one_solve_where_nothing_folds(face, count_calls):
     mesh, z, landmarks = face
     factored, solved = count_calls(Cholesky, "__init__"), count_calls(Cholesky, "solve")
-    found = register(mesh, z, landmarks, z[landmarks] + 0.05j)
-    assert found.lambdas == (100.0,)
+    registration = register(mesh, z, landmarks, z[landmarks] + 0.05j)
+    assert registration.lambdas == (100.0,)
     assert (len(factored), len(solved)) == (1, 1)
-    assert flipped_triangles(mesh, found.uv) == 0
+    assert flipped_triangles(mesh, registration.uv) == 0
 
 
 def test_more_lambda_meets_the_landmarks_better_and_costs_energy(face):
@@ -46,9 +46,9 @@ def test_more_lambda_meets_the_landmarks_better_and_costs_energy(face):
     L = laplacian(mesh)
     errors, energies = [], []
     for lam in (1.0, 10.0, 100.0):
-        found = register(mesh, z, landmarks, z[landmarks] * 1.1 + 0.02, lam=lam)
-        errors.append(found.landmark_error)
-        energies.append(np.vdot(found.uv, L @ found.uv).real / 2)
+        registration = register(mesh, z, landmarks, z[landmarks] * 1.1 + 0.02, lam=lam)
+        errors.append(registration.landmark_error)
+        energies.append(np.vdot(registration.uv, L @ registration.uv).real / 2)
     assert errors == sorted(errors, reverse=True)
     assert energies == sorted(energies)
     assert errors[-1] < NEAR
@@ -58,23 +58,23 @@ def test_folds_are_repaired_by_smaller_lambdas_step_by_step(face):
     """Eyes and mouth turned about the nose so far that one solve folds."""
     mesh, z, landmarks = face
     targets = z[landmarks] * np.exp(1.2j)
-    found = register(mesh, z, landmarks, targets)
-    assert len(found.lambdas) > 1
-    assert all(lam < 100 for lam in found.lambdas[:-1])
-    assert flipped_triangles(mesh, found.uv) == 0
-    assert found.landmark_error <= NEAR
-    np.testing.assert_array_equal(found.uv[mesh.boundary], z[mesh.boundary])
+    registration = register(mesh, z, landmarks, targets)
+    assert len(registration.lambdas) > 1
+    assert all(lam < 100 for lam in registration.lambdas[:-1])
+    assert flipped_triangles(mesh, registration.uv) == 0
+    assert registration.landmark_error <= NEAR
+    np.testing.assert_array_equal(registration.uv[mesh.boundary], z[mesh.boundary])
 
 
 def test_a_face_of_another_size_in_the_disk_is_stretched_before(face):
     """One radial stretch of even dilatation, instead of many steps that wear triangles thin."""
     mesh, z, landmarks = face
     at = z[landmarks]
-    found = register(mesh, z, landmarks, at * np.abs(at) ** 2)
-    assert found.exponent == pytest.approx(3, rel=1e-6)
-    assert len(found.lambdas) == 1
-    assert found.landmark_error <= NEAR
-    assert flipped_triangles(mesh, found.uv) == 0
+    registration = register(mesh, z, landmarks, at * np.abs(at) ** 2)
+    assert registration.exponent == pytest.approx(3, rel=1e-6)
+    assert len(registration.lambdas) == 1
+    assert registration.landmark_error <= NEAR
+    assert flipped_triangles(mesh, registration.uv) == 0
 
 
 def test_the_stretch_keeps_the_boundary_and_has_even_dilatation(face):

@@ -27,12 +27,12 @@ def test_the_verb_lays_down_steps_map_and_table(cli, ring):
     assert koebe["sweeps"] == 1
     assert koebe["boundary_circularity"] < 1e-10
     assert len(koebe["boundaries"]) == 2
-    found = {exhibit.name: exhibit for exhibit in read_exhibits(cli.folder / "r")}
-    assert sorted(found) == ["holes", "koebe-map-ring", "koebe-steps-ring"]
-    assert found["koebe-steps-ring"].figure == "Figure 1"
-    assert found["koebe-map-ring"].figure == "Figure 7"
+    by_key = {exhibit.name: exhibit for exhibit in read_exhibits(cli.folder / "r")}
+    assert sorted(by_key) == ["holes", "koebe-map-ring", "koebe-steps-ring"]
+    assert by_key["koebe-steps-ring"].figure == "Figure 1"
+    assert by_key["koebe-map-ring"].figure == "Figure 7"
     # In each step of the sweep, the boundary that it opened is a circle.
-    rows = found["koebe-steps-ring"].tables[0].rows
+    rows = by_key["koebe-steps-ring"].tables[0].rows
     assert [row[0] for row in rows] == ["hole 1", "outer"]
     assert rows[0][3] < 1e-12
     assert rows[1][2] < 1e-12
@@ -85,8 +85,8 @@ def test_it_tells_its_steps_while_it_works(tmp_path):
     algorithms = [load_registry().algorithm("koebe-cem")]
     heard = []
     run = (tmp_path / "run", "cembench holes", pytest.fail, heard.append)
-    found = examine_holes(mesh, algorithms, None, 2, *run)
-    assert list(found) == ["koebe-cem"]
+    result = examine_holes(mesh, algorithms, None, 2, *run)
+    assert list(result) == ["koebe-cem"]
     steps = [words for words in heard if "is a circle" in words]
     assert len(steps) == len(set(steps)) == 2 * len(mesh.loops)
-    assert len(heard) == len(steps) + 1 + len(found.rows) + 1
+    assert len(heard) == len(steps) + 1 + len(result.rows) + 1

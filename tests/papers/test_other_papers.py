@@ -116,13 +116,13 @@ def openabf_run(tmp_path_factory):
 
 
 def test_openabf_s_claims_on_its_own_tables_are_decided(openabf_run):
-    found = verdicts(openabf_run, "openabf", small_openabf())
-    assert found["iterative-is-slower"][1].startswith("14 of 14 printed cells")
-    assert found["ratios-follow"] == ("holds", "3 of 3 ratios")
-    assert found["incomplete-cholesky"][0] == "holds in part"
-    assert "sphere~50880f 14.56" in found["incomplete-cholesky"][1]
-    assert found["caps-take-more"][0] == "holds"
-    assert re.search(r"hemispheres \d.*; wavy squares \d", found["caps-take-more"][1])
+    by_claim = verdicts(openabf_run, "openabf", small_openabf())
+    assert by_claim["iterative-is-slower"][1].startswith("14 of 14 printed cells")
+    assert by_claim["ratios-follow"] == ("holds", "3 of 3 ratios")
+    assert by_claim["incomplete-cholesky"][0] == "holds in part"
+    assert "sphere~50880f 14.56" in by_claim["incomplete-cholesky"][1]
+    assert by_claim["caps-take-more"][0] == "holds"
+    assert re.search(r"hemispheres \d.*; wavy squares \d", by_claim["caps-take-more"][1])
 
 
 def test_the_report_shows_printed_beside_measured_and_opens_the_source(
@@ -162,28 +162,28 @@ def test_a_paper_without_printed_tables_has_claims_alone(disks, tmp_path, quick_
     titles = [section.title for section in sections_of(report)]
     assert "Claims of the paper" in titles
     assert not any(title.startswith("Table") for title in titles)
-    found = verdicts(disks, "ldm2018")
-    assert found["time-saved"] == (
+    by_claim = verdicts(disks, "ldm2018")
+    assert by_claim["time-saved"] == (
         "holds", "2 of 2 surfaces; saved flat-disk: 67%; hemi-ellipsoid: 67%, median 67%",
     )  # fmt: skip
-    assert found["comparable-accuracy"][0] == "holds"
+    assert by_claim["comparable-accuracy"][0] == "holds"
 
 
 def test_amortised_cost_leaves_out_the_factorisation(disks):
-    found = verdicts(disks, "bff2017")
-    assert found["fifty-times"] == (
+    by_claim = verdicts(disks, "bff2017")
+    assert by_claim["fifty-times"] == (
         "holds", "CETM over amortised BFF: 60 (surface 1), 60 (surface 2)",
     )  # fmt: skip
-    assert found["faster-than-linear"][0] == "holds"
-    assert found["program-agrees"][0] == "holds"
-    assert found["single-factorisation"][0] == "not tested here"
+    assert by_claim["faster-than-linear"][0] == "holds"
+    assert by_claim["program-agrees"][0] == "holds"
+    assert by_claim["single-factorisation"][0] == "not tested here"
 
 
 def test_flips_are_compared_with_cetm_where_that_fails(disks):
-    found = verdicts(disks, "ceps2021")
-    assert found["any-mesh"][0] == "holds"
-    assert found["exactly-conformal"][0] == "holds"
-    assert found["where-cetm-fails"] == (
+    by_claim = verdicts(disks, "ceps2021")
+    assert by_claim["any-mesh"][0] == "holds"
+    assert by_claim["exactly-conformal"][0] == "holds"
+    assert by_claim["where-cetm-fails"] == (
         "not tested here",
         "CETM has 2 of 2 surfaces, cetm-flips 2; 0 of the 0 that CETM lacks",
     )
@@ -191,15 +191,15 @@ def test_flips_are_compared_with_cetm_where_that_fails(disks):
 
 def test_the_overlay_is_judged_on_the_refinement():
     mesh = hemi_ellipsoid(600)
-    found = cetm_flips_overlay(mesh)
-    told = found.extras
-    assert (told["overlay_valid"], flipped_triangles(mesh, found.uv)) == (1.0, 0)
+    result = cetm_flips_overlay(mesh)
+    told = result.extras
+    assert (told["overlay_valid"], flipped_triangles(mesh, result.uv)) == (1.0, 0)
     assert told["overlay_triangles"] > mesh.m
     assert told["flips"] > 0
     assert told["curvature"] < 1e-9
     own = load_registry().algorithm("cetm-flips").function(mesh)
     assert told["curvature"] == own.extras["curvature"]
-    assert np.allclose(found.uv, own.uv, atol=1e-12)
+    assert np.allclose(result.uv, own.uv, atol=1e-12)
 
 
 def test_the_table_of_success_counts_maps_folds_and_angle_sums(disks, tmp_path, quick_drawing):
@@ -245,10 +245,10 @@ def test_our_reading_of_fdm_is_compared_with_the_program(disks):
     paper = of_models("fdm2015", [(mesh.name, mesh.m)])
     evidence = Evidence.of(disks, paper)
     assert [(s.paper_row, s.origin) for s in evidence.models] == [("model 0", "model")]
-    found = {claim.name: claim for claim in claims(evidence, {})}
-    assert found["program-bijective"].verdict == "holds"
+    by_key = {claim.name: claim for claim in claims(evidence, {})}
+    assert by_key["program-bijective"].verdict == "holds"
     # These cells are not of `public_program`, so the program stands alone.
-    assert found["our-reading"].verdict == "not tested here"
+    assert by_key["our-reading"].verdict == "not tested here"
     checks = paper.functions()
     assert checks["apart"](evidence.frame["seconds"].dropna().iloc[:2]) >= 0
 
@@ -259,10 +259,10 @@ def test_the_program_for_holes_is_compared_with_ours(tmp_path):
     seconds = {"poly-annulus-program": 9.0, "koebe-cem": 1.0, "direct-cem-holes": 1.0}
     run = write(tmp_path / "run", [mesh], seconds, by=by)
     evidence = Evidence.of(run, of_models("polyannulus2021", [(mesh.name, mesh.m)]))
-    found = {claim.name: claim for claim in claims(evidence, {})}
-    assert found["bijective"].verdict == "holds"
-    assert found["koebe-cem-closer"].verdict == "does not hold here"  # the same map
-    assert " beside " in found["direct-cem-closer"].figures
+    by_key = {claim.name: claim for claim in claims(evidence, {})}
+    assert by_key["bijective"].verdict == "holds"
+    assert by_key["koebe-cem-closer"].verdict == "does not hold here"  # the same map
+    assert " beside " in by_key["direct-cem-closer"].figures
 
 
 def test_no_paper_has_no_models():

@@ -80,8 +80,8 @@ def test_a_stretched_disk_with_obtuse_triangles_breaks_the_signs_and_says_so():
 
 def test_ears_break_definition_1():
     V, F = gallery.flat_rectangle()
-    given = by_name(premises(BoundaryOperator(DiskMesh.from_arrays(V, F))))
-    assert not given["(iv) each boundary vertex has an interior neighbour"].holds
+    statements = by_name(premises(BoundaryOperator(DiskMesh.from_arrays(V, F))))
+    assert not statements["(iv) each boundary vertex has an interior neighbour"].holds
 
 
 def test_a_mesh_without_interior_has_no_K():
@@ -117,10 +117,10 @@ def test_the_verb_shows_and_lays_down_an_exhibit(cli):
 def test_in_python_too_the_exhibit_names_the_command_that_makes_it_again(tmp_path):
     import cembench
 
-    found = cembench.theory("flat-disk", faces=100, iterations=10, run=tmp_path / "r")
+    result = cembench.theory("flat-disk", faces=100, iterations=10, run=tmp_path / "r")
     (exhibit,) = read_exhibits(tmp_path / "r")
     assert exhibit.command == "cembench theory flat-disk --iterations 10 --faces 100"
-    assert exhibit.facts["vertices"] == found.facts["vertices"]
+    assert exhibit.facts["vertices"] == result.facts["vertices"]
 
 
 def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
@@ -174,8 +174,8 @@ def test_the_certificate_is_told_in_json_and_in_eighty_columns(cli):
     table = out[out.index("four boundary points") :]
     assert f"{found['lower']:.5f}" in table
     assert f"{found['off']['CEM, start']:+.1e}" in table
-    told = [line for line in out.splitlines() if not line.startswith("Exhibits")]
-    assert max(map(len, told)) <= 80
+    items = [line for line in out.splitlines() if not line.startswith("Exhibits")]
+    assert max(map(len, items)) <= 80
 
 
 def test_a_surface_without_four_boundary_points_has_no_certificate():

@@ -62,20 +62,20 @@ def record(algorithm, mesh, row, policy, outcome):
 
 def ok(algorithm, mesh, seconds):
     """What a call comes to whose six rounds all took so many seconds."""
-    found = load_registry().algorithm(algorithm).function(mesh)
+    solve = load_registry().algorithm(algorithm).function(mesh)
     half = {"solves": seconds / 2, "other": seconds / 2}
     rounds = tuple(Round(sitting="s", calls=(seconds,), phases=half) for _ in range(6))
     outcome = Outcome(
         status="ok",
         rounds=rounds,
-        metrics=all_metrics(mesh, found.uv),
-        iterations=found.iterations,
-        energy_history=found.energy_history,
-        extras=found.extras,
+        metrics=all_metrics(mesh, solve.uv),
+        iterations=solve.iterations,
+        energy_history=solve.energy_history,
+        extras=solve.extras,
         peak_memory_bytes=10**8,
         memory_increase_bytes=10**7,
     )
-    return outcome, found.uv
+    return outcome, solve.uv
 
 
 def write_run(folder, policies=POLICIES, algorithms=tuple(SECONDS)):

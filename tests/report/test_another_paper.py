@@ -51,8 +51,8 @@ def test_its_claims_have_verdicts(report):
     assert claims["small-angles"].verdict == "does not hold here"
     assert "Chinese Vase" in claims["small-angles"].figures
     assert claims["small-angles"].remark.endswith("Not much of a claim.")
-    told = plain(report.findings.sentences[0])
-    assert told.startswith("Of 2 claims of the paper, 1 does not hold here: small angles; 1 holds")
+    text = plain(report.findings.sentences[0])
+    assert text.startswith("Of 2 claims of the paper, 1 does not hold here: small angles; 1 holds")
 
 
 def test_its_pictures_are_there_and_no_other_paper_s(report):

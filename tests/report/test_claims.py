@@ -19,13 +19,13 @@ from tests.report.small_run import write_run
 
 @pytest.fixture(scope="module")
 def inspections(evidence):
-    found = {}
+    by_name = {}
     for surface in evidence.surfaces:
         mesh, series = evidence.mesh(surface), evidence.series_of("cem")
         record = evidence.find(surface, series)
         angles = {series.label: _angles(mesh, evidence.uv(record), record)}
-        found[surface.mesh_hash] = Inspection(surface, kept=True, angles=angles)
-    return found
+        by_name[surface.mesh_hash] = Inspection(surface, kept=True, angles=angles)
+    return by_name
 
 
 @pytest.fixture(scope="module")

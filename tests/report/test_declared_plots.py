@@ -150,8 +150,8 @@ def test_a_variant_tried_on_fewer_surfaces_is_left_out_of_a_profile(evidence):
         [*rows, (0, "a (x=1)", 2, False)],
         columns=["place", "label", "series", "main"],
     )
-    found = cost_ratios(frame, pd.Series([1.0, 2.0, 2.0, np.inf, 0.5]))
-    assert found.to_dict("list") == {"a": [1.0, 1.0], "b": [2.0, np.inf]}
+    ratios = cost_ratios(frame, pd.Series([1.0, 2.0, 2.0, np.inf, 0.5]))
+    assert ratios.to_dict("list") == {"a": [1.0, 1.0], "b": [2.0, np.inf]}
 
 
 def test_a_front_has_the_means_that_no_other_beats():

@@ -28,16 +28,16 @@ def test_rows_compare_with_the_reference():
 
 
 def test_every_format_holds_every_row_and_column(tmp_path):
-    found = rows(RECORDS)
+    exported = rows(RECORDS)
     for form in Format:
-        export_rows(found, tmp_path / form.value, form)
-    assert json.loads((tmp_path / "json").read_text()) == found
+        export_rows(exported, tmp_path / form.value, form)
+    assert json.loads((tmp_path / "json").read_text()) == exported
     with (tmp_path / "csv").open(newline="") as file:
         lines = list(csv.DictReader(file))
     assert [line["algorithm"] for line in lines] == ["slow", "cem", "broken"]
     assert json.loads(lines[0]["seconds_raw"]) == [2.0] * 6
     table = parquet.read_table(tmp_path / "parquet").to_pylist()
-    assert [set(line) for line in table] == [set(found[0])] * 3
+    assert [set(line) for line in table] == [set(exported[0])] * 3
     assert table[0]["seconds_calls"] == [[2.0]] * 6
     assert json.loads(table[2]["parameters"]) == {"steps": "many"}
 

@@ -40,9 +40,9 @@ def words_of(found):
 
 def test_the_fastest_is_named_among_maps_as_good_with_an_interval(evidence):
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
-    found = findings(on_one, {}, [])
-    assert words_of(found)[0].startswith("On one surface, ")
-    times, angles, ended = found.figures
+    head = findings(on_one, {}, [])
+    assert words_of(head)[0].startswith("On one surface, ")
+    times, angles, ended = head.figures
     # Invented seconds are equal in all rounds: the interval is the figure itself.
     interval = times.words.rpartition("95 % interval ")[2]
     low, high = (float(number) for number in interval.split(" to "))
@@ -59,9 +59,9 @@ def test_of_few_rounds_no_winner_is_named(evidence):
 
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
     few = replace(on_one, records=tuple(map(first_round, on_one.records)))
-    found = findings(few, {}, [])
-    assert any("these rounds do not show which of the two" in words for words in words_of(found))
-    assert "1 round: too few for an interval" in found.figures[0].words
+    head = findings(few, {}, [])
+    assert any("these rounds do not show which of the two" in words for words in words_of(head))
+    assert "1 round: too few for an interval" in head.figures[0].words
     timed = ("always-faster", "average-rates", "average-savings", "more-than-80-percent")
     known = [one for one in few.paper.claims if one.name in (*timed, "table-2-follows")]
     asked = few.paper.model_copy(update={"claims": tuple(known)})
@@ -74,9 +74,9 @@ def test_of_few_rounds_no_winner_is_named(evidence):
 
 def test_a_run_in_which_nothing_ended_ok_names_nobody(evidence):
     failed = without(evidence, lambda r: r.outcome.status == "ok")
-    found = findings(failed, {}, [])
-    assert words_of(found) == ["No map to the disk to compare."]
-    assert [figure.number for figure in found.figures] == [f"0 of {len(failed.records)}"]
+    head = findings(failed, {}, [])
+    assert words_of(head) == ["No map to the disk to compare."]
+    assert [figure.number for figure in head.figures] == [f"0 of {len(failed.records)}"]
 
 
 def claim_with(verdict, name):
@@ -98,13 +98,15 @@ def test_all_verdicts_are_counted_failing_ones_first_and_linked():
 
 
 def test_the_papers_own_claim_stands_beside_what_was_measured(evidence):
-    told = claim_of_the_paper(evidence)
+    sentence = claim_of_the_paper(evidence)
     # Invented: QIEM takes 8 s on one model, FDM 3 and 6, LDM 0.5 and 1; CEM 1, as `backslash` 2.
-    assert told.startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; here ")
-    rates = re.findall(r"(-?\d+\.\d)(?:, | \()", told.partition("here ")[2])
+    assert sentence.startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; here ")
+    rates = re.findall(r"(-?\d+\.\d)(?:, | \()", sentence.partition("here ")[2])
     assert list(map(float, rates)) == pytest.approx([7, 3.5, -0.25, 3, 1.25, -0.625], abs=0.06)
-    assert 0 < told.index("(reuse)") < told.index("(backslash)")
-    assert told.endswith("here over 2 stand-ins, too few for an interval (6 rounds on 6 models).")
+    assert 0 < sentence.index("(reuse)") < sentence.index("(backslash)")
+    assert sentence.endswith(
+        "here over 2 stand-ins, too few for an interval (6 rounds on 6 models)."
+    )
 
 
 def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
@@ -122,11 +124,13 @@ def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
     records = [r for r in vase.records if r.cell.solves == "reuse" and r.outcome.status == "ok"]
     models = find_paper("cem").models[:6]
     six = tuple(on(r, 1 + k / 10, model) for k, model in enumerate(models) for r in records)
-    told = claim_of_the_paper(replace(evidence, records=six))
-    mean, low, high = re.search(r"here not measured, (\S+) \((\S+) to (\S+)\), -0.5", told).groups()
+    sentence = claim_of_the_paper(replace(evidence, records=six))
+    mean, low, high = re.search(
+        r"here not measured, (\S+) \((\S+) to (\S+)\), -0.5", sentence
+    ).groups()
     assert float(mean) == pytest.approx(2.75, abs=0.06)
     assert float(low) < float(mean) < float(high)
-    assert told.endswith("here over 6 of its models, with 95 % intervals over models.")
+    assert sentence.endswith("here over 6 of its models, with 95 % intervals over models.")
 
 
 def with_angles(evidence, **angles):
@@ -170,11 +174,11 @@ def test_smallest_is_said_only_of_an_interval_without_one(evidence):
 
 def test_an_algorithm_with_one_wrecked_map_is_not_shown_to_be_worse(evidence):
     wrecked = {"fdm": [1.0] * 9, "cem": [1.14] * 9, "ldm": [1.0] * 8 + [30.0]}
-    found = findings(with_angles(evidence, **wrecked), {}, [])
-    assert words_of(found)[0].startswith(
+    head = findings(with_angles(evidence, **wrecked), {}, [])
+    assert words_of(head)[0].startswith(
         "On 9 surfaces, FDM has the smallest angle errors (not decided against LDM); CEM's are "
     )
-    assert found.suspects == ("LDM on mine-8: 30 degrees, the other algorithms' median is 1.07",)
+    assert head.suspects == ("LDM on mine-8: 30 degrees, the other algorithms' median is 1.07",)
 
 
 def test_few_surfaces_have_no_interval_and_nobody_is_the_best(evidence):

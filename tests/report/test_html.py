@@ -329,7 +329,7 @@ def test_the_white_round_a_picture_becomes_transparent_and_the_white_in_it_stays
     pixels[10:50, 20:60] = (80, 130, 180)
     pixels[25:35, 35:45] = 255  # within
     pixels[5, 5] = 200  # a speck, as JPEG leaves them
-    found = np.asarray(with_transparent_background(Image.fromarray(pixels)))
-    assert (found[:8, :, 3] == 0).all()
-    assert (found[12:48, 22:58, 3] == 255).all()
-    assert found.shape == (60, 80, 4)
+    array = np.asarray(with_transparent_background(Image.fromarray(pixels)))
+    assert (array[:8, :, 3] == 0).all()
+    assert (array[12:48, 22:58, 3] == 255).all()
+    assert array.shape == (60, 80, 4)

@@ -126,13 +126,13 @@ def page(browser, address):
             return self.all("figure.plot .drawn .scatterlayer .point")
 
         def boxes(self, selector):
-            found = self.run(
+            result = self.run(
                 "return [...document.querySelectorAll(arguments[0])]"
                 ".map(e => e.getBoundingClientRect()).map(b => [b.left, b.top, b.bottom])",
                 selector,
             )
-            assert found, selector
-            return found
+            assert result, selector
+            return result
 
         def overflow(self):
             return self.run(

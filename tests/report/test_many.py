@@ -161,8 +161,8 @@ def test_the_report_has_a_page_for_the_hardest_alone(run, tmp_path, quick_drawin
 
 
 def test_what_is_found_counts_all_surfaces(evidence):
-    found = many_findings(evidence)
-    valid, angles, counts, fastest, _ = map(plain, found.sentences)
+    head = many_findings(evidence)
+    valid, angles, counts, fastest, _ = map(plain, head.sentences)
     assert valid == (
         "Over 26 surfaces, 3 of 4 algorithms have a valid map of every one that they take: Direct "
         "CEM, Harmonic and LSCM."
@@ -176,7 +176,7 @@ def test_what_is_found_counts_all_surfaces(evidence):
         counts,
     )
     assert "surface" in fastest
-    cells, *_, worst = found.figures
+    cells, *_, worst = head.figures
     assert cells.number == f"{100 * 101 / 104:.1f} %"
     assert worst.words.startswith("the worst mean angle error of a valid map: ")
 
@@ -213,10 +213,10 @@ def test_shapes_are_those_of_surfaces_known_in_closed_form():
     V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [-1, 1, 0], [-1, 0, 0], [-1, -1, 0]]
     V += [[0, -1, 0], [1, -1, 0]]
     fan = DiskMesh.from_arrays(V, [[0, k, k % 8 + 1] for k in range(1, 9)])
-    found = shape(fan)
-    assert found.boundary_excess == pytest.approx(8 / (2 * np.sqrt(np.pi * 4)))
-    assert (found.obtuse_share, found.chord_share) == (0, 0)
-    assert found.angle_defect == pytest.approx(0, abs=1e-9)
+    shape_of = shape(fan)
+    assert shape_of.boundary_excess == pytest.approx(8 / (2 * np.sqrt(np.pi * 4)))
+    assert (shape_of.obtuse_share, shape_of.chord_share) == (0, 0)
+    assert shape_of.angle_defect == pytest.approx(0, abs=1e-9)
     raised = DiskMesh.from_arrays([[0, 0, 1], *V[1:]], fan.F)
     corner = np.degrees(np.arccos(2 / np.sqrt(2 * 3)))
     assert shape(raised).angle_defect == pytest.approx(360 - 8 * corner)

@@ -61,9 +61,9 @@ def test_plotly_is_told_the_same_values(plot):
 
 def test_algorithms_look_different_from_one_another_and_the_same_everywhere():
     names = ["cem", "qiem", "fdm", "ldm", "harmonic-circle", "lscm", "mine", "yours"]
-    found = series_styles(names)
-    assert len({found[name].colour for name in names}) == len(names)
-    assert series_styles(["zebra", "cem"])["cem"] == found["cem"]
+    styles = series_styles(names)
+    assert len({styles[name].colour for name in names}) == len(names)
+    assert series_styles(["zebra", "cem"])["cem"] == styles["cem"]
 
 
 def test_thirty_algorithms_have_styles_of_their_own():
@@ -76,9 +76,9 @@ def test_thirty_algorithms_have_styles_of_their_own():
         "lscm",
         *(f"other {k}" for k in range(24)),
     ]
-    found = series_styles(names)
-    assert len({(found[name].colour, found[name].marker) for name in names}) == len(names)
-    assert len({(found[name].colour, found[name].dash) for name in names}) == len(names)
+    styles = series_styles(names)
+    assert len({(styles[name].colour, styles[name].marker) for name in names}) == len(names)
+    assert len({(styles[name].colour, styles[name].dash) for name in names}) == len(names)
 
 
 def test_the_printed_seconds_have_their_exponents(evidence):

@@ -242,15 +242,15 @@ def test_nothing_is_left_of_a_report_that_fails(small_run, tmp_path, monkeypatch
 @pytest.mark.usefixtures("quick_drawing")
 def test_the_verb_says_where_the_report_is(cli, small_run):
     code, out, err = cli("report", small_run, "-o", "out", "--json")
-    found = json.loads(out)
+    data = json.loads(out)
     assert code == 0
-    assert (cli.folder / found["html"]).is_file()
-    assert found["claims"]["delaunay"] == "holds"
-    assert "table-4" in found["tables"]
-    assert found["paper"]["doi"] == CITATION.doi
-    assert found["findings"][0].startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; ")
-    assert sum(found["verdicts"].values()) == len(found["claims"])
-    assert next(iter(found["verdicts"])) == "does not hold here"
+    assert (cli.folder / data["html"]).is_file()
+    assert data["claims"]["delaunay"] == "holds"
+    assert "table-4" in data["tables"]
+    assert data["paper"]["doi"] == CITATION.doi
+    assert data["findings"][0].startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; ")
+    assert sum(data["verdicts"].values()) == len(data["claims"])
+    assert next(iter(data["verdicts"])) == "does not hold here"
     assert "[1/4] surface Chinese Vase" in err
 
 
@@ -298,13 +298,13 @@ def fdm_record(store, mesh_name, origin, public_program):
 def labels_of(store):
     """The label of the series of each cell of FDM that has parameters."""
     evidence = Evidence.of(store.folder)
-    found = {}
+    by_name = {}
     for surface in evidence.surfaces:
         for series in evidence.series:
             record = evidence.find(surface, series) if series.algorithm == "fdm" else None
             if record is not None and record.cell.parameters:
-                found[record.cell.key] = dict(series.variant)["public_program"]
-    return found
+                by_name[record.cell.key] = dict(series.variant)["public_program"]
+    return by_name
 
 
 def test_a_model_run_as_printed_is_in_the_column_of_the_other_surfaces(tmp_path):

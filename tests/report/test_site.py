@@ -22,17 +22,17 @@ def published(tmp_path, number, ldm_seconds, *meshes, **more):
 def test_history_averages_over_the_surfaces_that_runs_have_in_common(tmp_path):
     first = published(tmp_path, 1, 4.0, "hat", "cap", git={"commit": "a" * 40, "dirty": True})
     second = published(tmp_path, 2, 9.0, "hat")
-    told = history([first, second])
-    assert [one.ratio for one in told["ldm"]] == pytest.approx([4.0, 9.0])
-    assert all(one.common for one in told["ldm"])
-    assert [one.surfaces for one in told["ldm"]] == [1, 1]
+    page = history([first, second])
+    assert [one.ratio for one in page["ldm"]] == pytest.approx([4.0, 9.0])
+    assert all(one.common for one in page["ldm"])
+    assert [one.surfaces for one in page["ldm"]] == [1, 1]
     assert first.commits == ("aaaaaaaaaa+",)
     assert first.machines == {"node-1": 4}
 
 
 def test_runs_without_a_surface_in_common_are_starred(tmp_path):
-    told = history([published(tmp_path, 1, 4.0, "hat"), published(tmp_path, 2, 9.0, "cap")])
-    assert [str(one) for one in told["ldm"]] == ["4.00 (1*)", "9.00 (1*)"]
+    page = history([published(tmp_path, 1, 4.0, "hat"), published(tmp_path, 2, 9.0, "cap")])
+    assert [str(one) for one in page["ldm"]] == ["4.00 (1*)", "9.00 (1*)"]
 
 
 def test_ratios_are_never_formed_over_two_machines(tmp_path):
@@ -60,9 +60,9 @@ def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, 
     for number in (1, 2):
         published(tmp_path, number, 4.0, "hat")
     runs = [tmp_path / "run-2", tmp_path / "run-1"]
-    found = publish(runs, tmp_path / "site")
+    result = publish(runs, tmp_path / "site")
     assert shown == ["run-2", "run-1"]
-    assert [run.name for run in found] == ["run-1", "run-2"]
+    assert [run.name for run in result] == ["run-1", "run-2"]
     page = (tmp_path / "site/index.html").read_text()
     links = re.findall(r'(?:href|src)="([^"]+)"', page)
     pages = {f"{place}/index.html" for place in ("runs/run-1", "runs/run-2", "leaderboard")}

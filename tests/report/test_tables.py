@@ -114,11 +114,13 @@ def test_a_record_older_than_a_figure_has_a_gap_there(evidence):
 
 
 def test_other_algorithms_and_surfaces_have_tables_of_their_own(evidence):
-    found = by_name(printed_tables(evidence, 1))
-    assert {"table-1", "table-1-other-algorithms", "table-1-other-surfaces"} <= set(found)
-    groups = {column.group for column in found["table-1-other-algorithms"].columns}
+    statements = by_name(printed_tables(evidence, 1))
+    assert {"table-1", "table-1-other-algorithms", "table-1-other-surfaces"} <= set(statements)
+    groups = {column.group for column in statements["table-1-other-algorithms"].columns}
     assert groups == {"", "Harmonic"}
-    assert not any(column.title == "printed" for column in found["table-1-other-surfaces"].columns)
+    assert not any(
+        column.title == "printed" for column in statements["table-1-other-surfaces"].columns
+    )
 
 
 def test_the_printed_averages_are_the_stated_ones_in_both_readings():
@@ -166,10 +168,10 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
     known = Evidence(evidence.store, tuple(map(counted, evidence.records)), evidence.exhibits)
     table = averages_table(known, 2, "reuse")
     (row,) = (row for row in table.rows if "factorisations" in row[0].text)
-    told = dict(zip([(c.group, c.title) for c in table.columns], row, strict=True))
-    assert told["QIEM", "here"].number == pytest.approx(8)
-    assert told["LDM", "here"].number == pytest.approx(2)
-    assert told["FDM", "here"].number is None
+    by_name = dict(zip([(c.group, c.title) for c in table.columns], row, strict=True))
+    assert by_name["QIEM", "here"].number == pytest.approx(8)
+    assert by_name["LDM", "here"].number == pytest.approx(2)
+    assert by_name["FDM", "here"].number is None
 
 
 def test_the_misprint_is_marked(evidence):

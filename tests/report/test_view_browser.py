@@ -160,5 +160,5 @@ def test_nothing_is_asked_for_and_nothing_complains(browser, single):
     opened(browser, single)
     asked = [entry["message"] for entry in browser.get_log("performance")]
     assert not any('"url":"http' in message for message in asked)
-    told = [entry["message"] for entry in browser.get_log("browser")]
-    assert [words for words in told if "GL" not in words] == []
+    items = [entry["message"] for entry in browser.get_log("browser")]
+    assert [words for words in items if "GL" not in words] == []

@@ -15,10 +15,10 @@ def counted(evidence):
     """The small run with counts for three algorithms on all surfaces but the flat disk."""
 
     def with_work(record):
-        found = COUNTS.get(record.cell.algorithm)
-        if found is None or not record.mesh.paper_row:
+        counts = COUNTS.get(record.cell.algorithm)
+        if counts is None or not record.mesh.paper_row:
             return record
-        numeric, solved, entries = found
+        numeric, solved, entries = counts
         work = LinearAlgebraWork(
             symbolic=1, numeric=numeric, right_hand_sides=solved, entries=entries
         )

@@ -35,19 +35,19 @@ def record_of(seconds, sittings=None, **cell):
 
 
 def test_the_speedup_is_eq_33_with_its_interval():
-    found = compare(record_of([3.0, 3.3, 2.7, 3.0, 3.0, 3.0]), record_of([1.0] * 6))
-    assert found.speedup == pytest.approx(2)
-    assert found.speedup_interval.low == pytest.approx(1.7)
-    assert found.speedup_interval.high == pytest.approx(2.3)
-    assert found.verdict == "slower"
+    comparison = compare(record_of([3.0, 3.3, 2.7, 3.0, 3.0, 3.0]), record_of([1.0] * 6))
+    assert comparison.speedup == pytest.approx(2)
+    assert comparison.speedup_interval.low == pytest.approx(1.7)
+    assert comparison.speedup_interval.high == pytest.approx(2.3)
+    assert comparison.verdict == "slower"
     assert compare(record_of([1.0] * 6), record_of([2.0] * 6)).verdict == "faster"
 
 
 def test_what_slows_both_cancels():
     drift = np.array([1, 2, 4, 8, 16, 32.0])
-    found = compare(record_of(1.1 * drift), record_of(drift))
-    assert found.verdict == "slower"
-    assert found.interval.high == pytest.approx(1.1)
+    comparison = compare(record_of(1.1 * drift), record_of(drift))
+    assert comparison.verdict == "slower"
+    assert comparison.interval.high == pytest.approx(1.1)
 
 
 @pytest.mark.parametrize(
@@ -60,8 +60,8 @@ def test_what_slows_both_cancels():
     ],
 )
 def test_nothing_is_said_that_is_not_shown(ours, theirs, verdict, rounds):
-    found = compare(ours, theirs)
-    assert (found.verdict, found.rounds) == (verdict, rounds)
+    comparison = compare(ours, theirs)
+    assert (comparison.verdict, comparison.rounds) == (verdict, rounds)
 
 
 def shared(seconds, together, **cell):
@@ -150,8 +150,8 @@ def test_a_bootstrap_of_six_rounds_would_be_wrong_more_often_than_it_says():
 
 def test_a_true_difference_is_found():
     rng = np.random.default_rng(7)
-    found = [compare_ratios(1.5 * rng.lognormal(0, 0.1, 6)).verdict for _ in range(200)]
-    assert found.count("slower") > 190
+    items = [compare_ratios(1.5 * rng.lognormal(0, 0.1, 6)).verdict for _ in range(200)]
+    assert items.count("slower") > 190
 
 
 def test_a_figure_is_unstable_where_its_interval_is_wide():
@@ -198,9 +198,9 @@ def test_cpu_seconds_are_compared_within_rounds_whatever_the_wall_clock_says():
     drift = [1.0, 2.0, 4.0, 1.0, 3.0, 1.0]
     ours = with_cpu(record_of([1.0] * 6), [3 * d for d in drift])
     theirs = with_cpu(record_of([9.0] * 6), drift)
-    found = compare_cpu(ours, theirs)
-    assert found.ratio == pytest.approx(3)
-    assert (found.verdict, found.rounds) == ("slower", 6)
+    comparison = compare_cpu(ours, theirs)
+    assert comparison.ratio == pytest.approx(3)
+    assert (comparison.verdict, comparison.rounds) == ("slower", 6)
     assert compare(ours, theirs).verdict == "faster"
 
 

@@ -26,9 +26,9 @@ from cembench.results.frame import FUNCTIONS
 @pytest.mark.parametrize("k", [0, 1, 13, 25, 26])
 def test_the_interval_of_whole_families_is_wilsons(k):
     wilson = binomtest(k, 26).proportion_ci(method="wilson")
-    found = share_interval(k / 26, 26)
-    assert (found.low, found.high) == pytest.approx((wilson.low, wilson.high), abs=1e-9)
-    assert k / 26 in found
+    interval = share_interval(k / 26, 26)
+    assert (interval.low, interval.high) == pytest.approx((wilson.low, wilson.high), abs=1e-9)
+    assert k / 26 in interval
 
 
 def test_more_surfaces_of_a_family_narrow_no_interval():
@@ -42,19 +42,19 @@ def test_more_surfaces_of_a_family_narrow_no_interval():
 def test_the_interval_of_an_average_is_students():
     figures = np.random.default_rng(3).lognormal(1, 0.5, 9)
     around = ttest_1samp(np.log(figures), 0).confidence_interval(0.95)
-    found = average_interval(figures.tolist())
-    assert (found.low, found.high) == pytest.approx((np.exp(around.low), np.exp(around.high)))
+    interval = average_interval(figures.tolist())
+    assert (interval.low, interval.high) == pytest.approx((np.exp(around.low), np.exp(around.high)))
     around = ttest_1samp(figures, 0).confidence_interval(0.95)
-    found = average_interval(figures.tolist(), log=False)
-    assert (found.low, found.high) == pytest.approx((max(0, around.low), around.high))
+    interval = average_interval(figures.tolist(), log=False)
+    assert (interval.low, interval.high) == pytest.approx((max(0, around.low), around.high))
 
 
 def test_the_interval_of_a_rate_is_that_of_the_average_less_one_and_needs_rounds():
     rng = np.random.default_rng(2)
     rounds = [[3.0 * s * f for f in rng.lognormal(0, 0.01, 6)] for s in rng.lognormal(0, 0.3, 8)]
-    found = rate_interval(rounds, log=False)
+    interval = rate_interval(rounds, log=False)
     whole = average_interval([float(np.median(r)) for r in rounds], log=False)
-    assert (found.low, found.high) == pytest.approx((whole.low - 1, whole.high - 1))
+    assert (interval.low, interval.high) == pytest.approx((whole.low - 1, whole.high - 1))
     assert rate_interval([r[:5] for r in rounds], log=False) is None
     assert rate_interval([*[r[:5] for r in rounds[:3]], *rounds[3:]], log=True) is not None
     assert rate_interval([], log=False) is None

@@ -14,9 +14,9 @@ def test_six_values_are_the_fewest():
 
 @pytest.mark.parametrize("n", range(6, 40))
 def test_it_is_the_narrowest_that_reaches_the_level(n):
-    found = median_interval(range(n))
-    cut = int(found.low)
-    assert found == Interval(cut, n - 1 - cut)
+    interval = median_interval(range(n))
+    cut = int(interval.low)
+    assert interval == Interval(cut, n - 1 - cut)
 
     def outside(j):
         return 2 * sum(comb(n, k) for k in range(j + 1)) / 2**n

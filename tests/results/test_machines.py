@@ -61,8 +61,8 @@ def two_machines(tmp_path):
 
 def test_the_same_cells_are_kept_apart_by_machine_and_conflicts_are_told(two_machines, tmp_path):
     into = Store(tmp_path / "all")
-    found = merge(two_machines, into)
-    assert found.cells == 3
+    result = merge(two_machines, into)
+    assert result.cells == 3
     environments = into.environments()
     held = {(r.cell.mesh, r.cell.algorithm): r.environment for r in into.records()}
     assert held == {("hat", "cem"): "e1", ("hat", "ldm"): "e1", ("cap", "cem"): "e2"}
@@ -70,7 +70,7 @@ def test_the_same_cells_are_kept_apart_by_machine_and_conflicts_are_told(two_mac
     (other,) = others_of(into)
     assert other.folder == tmp_path / "all/others/node-2"
     assert [(r.cell.mesh, r.outcome.median_seconds) for r in other.records()] == [("hat", 0.5)]
-    (conflict,) = found.conflicts
+    (conflict,) = result.conflicts
     assert str(conflict) == "hat / cem (reuse): node-1 ok 1 s, node-2 ok 0.5 s"
     assert conflict.same_map
 
@@ -84,13 +84,13 @@ def test_merging_again_changes_nothing_and_a_new_leader_takes_the_place(two_mach
     more = run_of(
         *(tmp_path / "3", "node-2"), record_of("ldm", "hat", "e2"), record_of("qiem", "hat", "e2")
     )
-    found = merge([more], into)
+    result = merge([more], into)
     assert {r.environment for r in into.records() if r.cell.mesh == "hat"} == {"e2"}
     others = {o.folder.name: o for o in others_of(into)}
     assert {r.cell.algorithm for r in others["node-1"].records()} == {"cem", "ldm"}
     assert others["node-2"].records() == []
-    assert found.cells == 4
-    assert all(c.machines == ("node-2", "node-1") for c in found.conflicts)
+    assert result.cells == 4
+    assert all(c.machines == ("node-2", "node-1") for c in result.conflicts)
 
 
 def printed(renderable):
@@ -125,9 +125,9 @@ def test_a_report_of_several_machines_marks_seconds_and_names_other_software(
     merge(two_machines, into)
     evidence = Evidence.of(tmp_path / "all")
     section = machines_section(evidence)
-    told = " ".join(str(getattr(item, "words", "")) for item in section.items)
-    assert "Seconds of 2 machines" in told
-    assert "node-2: python: None / 3.13" in told
+    message = " ".join(str(getattr(item, "words", "")) for item in section.items)
+    assert "Seconds of 2 machines" in message
+    assert "node-2: python: None / 3.13" in message
     (table,) = [item for item in section.items if isinstance(item, Table)]
     assert [[value.text for value in row] for row in table.rows] == [
         ["A", "node-1", "a processor", "1", "2"],

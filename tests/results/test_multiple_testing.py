@@ -27,8 +27,8 @@ def test_a_verdict_that_many_comparisons_do_not_bear_is_taken_back():
 
 def test_of_a_hundred_equal_algorithms_one_is_called_different_in_5_percent_of_tables():
     rng = np.random.default_rng(1)
-    found = [precision.family_error(model, 40_000, rng) for model in noise.MODELS]
-    assert max(found) <= ERROR + 0.03  # two standard deviations of the rarest event
+    items = [precision.family_error(model, 40_000, rng) for model in noise.MODELS]
+    assert max(items) <= ERROR + 0.03  # two standard deviations of the rarest event
 
 
 def test_one_of_a_hundred_is_found_where_it_is_clear():

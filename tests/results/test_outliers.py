@@ -60,12 +60,12 @@ def test_rounding_is_not_an_outlier():
 
 
 def test_an_algorithm_has_a_line_with_its_worst_map_first_and_harmonic_ones_come_last():
-    found = [
+    items = [
         map_of(name, f"m{k:02d}", angle)
         for k in range(10)
         for name, angle in (("cem", 1.0), ("ldm", 1.0), ("harmonic-circle", 4.0 + k), ("qiem", 1.0))
     ]
-    first, second = outlier_lines([*found, map_of("fdm", "m03", 5.0)])
+    first, second = outlier_lines([*items, map_of("fdm", "m03", 5.0)])
     assert first == "FDM on m03: 5 degrees, the other algorithms' median is 1"
     assert second.startswith("HARMONIC-CIRCLE on m09: 13 degrees, the other algorithms' median is ")
     assert f" and {9 - NAMED} more" in second

@@ -31,9 +31,9 @@ ALL = {f"stand-in-{k}": model for k, model in enumerate(sorted(PAPER.models))} |
     ],
 )
 def test_a_profile_takes_the_smallest_models_in_order(profile, count, last):
-    found = models(profile)
-    assert (len(found), found[0], found[-1]) == (count, "Nefertiti", last)
-    assert [ALL[name] for name in surfaces_of(profile, registry_of(ALL))] == found
+    chosen = models(profile)
+    assert (len(chosen), chosen[0], chosen[-1]) == (count, "Nefertiti", last)
+    assert [ALL[name] for name in surfaces_of(profile, registry_of(ALL))] == chosen
 
 
 def test_a_model_without_a_surface_is_said():

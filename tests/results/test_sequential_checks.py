@@ -27,9 +27,9 @@ def test_a_fixed_number_of_rounds_is_not_paid_for():
 
 @pytest.mark.parametrize("model", noise.MODELS)
 def test_equal_algorithms_are_called_different_in_at_most_5_percent(model):
-    found = precision.simulate(model, 1200, 0.05, most=40, seed=3)
-    assert found.wrong.mean() <= ERROR
-    assert found.ever_wrong.mean() <= ERROR + 0.01  # two standard deviations
+    simulated = precision.simulate(model, 1200, 0.05, most=40, seed=3)
+    assert simulated.wrong.mean() <= ERROR
+    assert simulated.ever_wrong.mean() <= ERROR + 0.01  # two standard deviations
 
 
 def test_looking_without_paying_would_be_wrong_more_often_than_stated():
@@ -43,6 +43,6 @@ def test_looking_without_paying_would_be_wrong_more_often_than_stated():
 
 
 def test_a_quiet_machine_takes_few_rounds():
-    found = precision.simulate("quiet (lognormal, 2 %)", 300, 0.05)
-    assert found.precise.all()
-    assert found.rounds.mean() < 10
+    simulated = precision.simulate("quiet (lognormal, 2 %)", 300, 0.05)
+    assert simulated.precise.all()
+    assert simulated.rounds.mean() < 10

@@ -9,9 +9,9 @@ from cembench.running.reference_kernel import kernel_seconds
 def test_what_others_did_is_what_ours_did_not():
     before = Counters(worked=100.0, stolen=5.0, throttles=3, at=0.0)
     after = Counters(worked=103.0, stolen=5.2, throttles=4, at=2.0)
-    found = neighbours(before, after, threads=1)
-    assert (found.other_cores, found.stolen_cores, found.throttled) == (0.5, 0.1, True)
-    assert found.busy
+    load = neighbours(before, after, threads=1)
+    assert (load.other_cores, load.stolen_cores, load.throttled) == (0.5, 0.1, True)
+    assert load.busy
     assert neighbours(before, after, threads=2).other_cores == 0
 
 

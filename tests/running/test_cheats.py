@@ -78,8 +78,8 @@ def records(names, mesh, folder, *, repeats=2):
     chosen = [registry.algorithm(name) for name in names]
     how = MeasurementSettings(repeats=repeats)
     tasks = plan_cells(chosen, [mesh], {}, how, [str(CHEATS)])
-    found = run_tasks(tasks, Store(folder), Options(timeout=120))
-    return {record.cell.algorithm: record for record in found}
+    records = run_tasks(tasks, Store(folder), Options(timeout=120))
+    return {record.cell.algorithm: record for record in records}
 
 
 def is_valid(record):
@@ -103,9 +103,9 @@ def assert_as_expected(found, expected):
 
 
 def test_what_is_kept_from_call_to_call_has_no_seconds(surface, tmp_path):
-    found = records([*FOUND, "by-id"], surface, tmp_path / "run")
+    outcomes = records([*FOUND, "by-id"], surface, tmp_path / "run")
     # An id comes back when its mesh is gone, or does not: a hit is found, and a miss is honest.
-    record = found.pop("by-id")
+    record = outcomes.pop("by-id")
     by_id = record.outcome
     assert is_valid(record) == (by_id.status == "ok")
     assert (by_id.status, [f.kind for f in by_id.faults][:1]) in (
@@ -113,29 +113,29 @@ def test_what_is_kept_from_call_to_call_has_no_seconds(surface, tmp_path):
         ("not_comparable", [FaultKind.KEPT_RESULT]),
         ("invalid", [FaultKind.OTHER_MAP]),
     )
-    assert_as_expected(found, FOUND)
-    found = {name: record.outcome for name, record in found.items()}
+    assert_as_expected(outcomes, FOUND)
+    outcomes = {name: record.outcome for name, record in outcomes.items()}
     # The map of the check is valid, and keeps its figures.
-    assert found["by-shape"].status == "not_comparable"
-    assert found["by-shape"].metrics["flipped_triangles"] == 0
-    assert "in round 1 of 2: the second call returned" in found["by-shape"].cause
+    assert outcomes["by-shape"].status == "not_comparable"
+    assert outcomes["by-shape"].metrics["flipped_triangles"] == 0
+    assert "in round 1 of 2: the second call returned" in outcomes["by-shape"].cause
     # What a map costs that is computed when it is looked at is in its time.
-    assert all(r.phases["solves"] > 0 for r in found["late"].rounds)
+    assert all(r.phases["solves"] > 0 for r in outcomes["late"].rounds)
     # A cache by content is never hit: each call does the work.
-    assert all(r.phases["solves"] > 0 for r in found["by-content"].rounds)
-    assert all(r.repeated for r in found["honest"].rounds)
+    assert all(r.phases["solves"] > 0 for r in outcomes["by-content"].rounds)
+    assert all(r.repeated for r in outcomes["honest"].rounds)
     # What the triangles determine is of no use for other numbers of the same vertices.
-    assert all(min(r.calls) > 0.3 for r in found["keeps-ordering"].rounds)
+    assert all(min(r.calls) > 0.3 for r in outcomes["keeps-ordering"].rounds)
     for name in ("kept-factor", "factor-by-triangles"):
-        assert all(r.phases["factorisation"] > 0.02 for r in found[name].rounds)
-        assert all(r.repeated for r in found[name].rounds)
+        assert all(r.phases["factorisation"] > 0.02 for r in outcomes[name].rounds)
+        assert all(r.repeated for r in outcomes[name].rounds)
     # A surface that did not exist cannot be mapped before the call.
-    assert all(r.phases["solves"] > 0 for r in found["collector"].rounds)
+    assert all(r.phases["solves"] > 0 for r in outcomes["collector"].rounds)
 
 
 def test_who_scatters_has_the_seconds_of_all_its_work(surface, tmp_path):
-    found = records(RANDOM, surface, tmp_path / "run", repeats=3)
-    for record in found.values():
+    outcomes = records(RANDOM, surface, tmp_path / "run", repeats=3)
+    for record in outcomes.values():
         assert record.outcome.status == "ok", record.outcome.cause
         assert of_kind(NoticeKind.NOT_DETERMINISTIC, record.outcome.notes)
         assert all(r.phases["solves"] > 0 for r in record.outcome.rounds)
@@ -144,8 +144,8 @@ def test_who_scatters_has_the_seconds_of_all_its_work(surface, tmp_path):
 
 @pytest.mark.slow
 def test_more_cores_and_changed_clocks_have_no_seconds(surface, tmp_path):
-    found = records(BUSY, surface, tmp_path / "run", repeats=1)
-    assert_as_expected(found, BUSY)
+    outcomes = records(BUSY, surface, tmp_path / "run", repeats=1)
+    assert_as_expected(outcomes, BUSY)
     # The second run gets other motions: what the first one left on disk is of no use.
     shutil.rmtree(tmp_path / "run")
     again = records(["on-disk"], surface, tmp_path / "run", repeats=1)["on-disk"]
@@ -172,8 +172,8 @@ def test_validate_finds_fault_with_whatever_a_round_found(kind):
     status = (
         "invalid" if kind in (FaultKind.OTHER_MAP, FaultKind.WRONG_REPORT) else "not_comparable"
     )
-    found = not_ok(status, Fault(kind=kind, detail="in any words"))
-    assert not is_valid(record_of([]).model_copy(update={"outcome": found}))
+    result = not_ok(status, Fault(kind=kind, detail="in any words"))
+    assert not is_valid(record_of([]).model_copy(update={"outcome": result}))
 
 
 @pytest.mark.slow

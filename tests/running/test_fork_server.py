@@ -65,9 +65,9 @@ def test_a_fault_in_a_forked_process_is_a_status_and_the_next_is_measured(
     timer, name, status, cause
 ):
     timer.launcher.options = Options(timeout=1 if name == "spins" else 600, memory_bytes=MEMORY)
-    found = timed(timer, name)
+    result = timed(timer, name)
     timer.launcher.options = Options(memory_bytes=MEMORY)
-    assert (found.status, cause in found.cause) == (status, True), found.cause
+    assert (result.status, cause in result.cause) == (status, True), result.cause
     server = timer.launcher._server.pid
     assert isinstance(timed(timer, "good"), Round)
     assert timer.launcher._server.pid == server
@@ -76,9 +76,9 @@ def test_a_fault_in_a_forked_process_is_a_status_and_the_next_is_measured(
 @pytest.mark.parametrize("name", ["daemonises", "detaches-twice"])
 def test_what_a_forked_process_leaves_is_ended(timer, name, tmp_path, monkeypatch):
     monkeypatch.setenv("FAULTY_CHILDREN", str(tmp_path / "children"))
-    found = timed(timer, name)
+    result = timed(timer, name)
     # A child may still be starting beside the next call, and then that is what is told.
-    assert isinstance(found, Round) or found.status == "not_comparable", found
+    assert isinstance(result, Round) or result.status == "not_comparable", result
     children = (tmp_path / "children").read_text().split()
     assert len(children) > 1  # a warm-up, and a call
     for child in map(int, children):
@@ -95,9 +95,9 @@ def test_the_global_generator_differs_from_process_to_process(timer):
 
 
 def test_without_its_server_a_process_has_failed_and_the_next_is_measured(timer):
-    found = timed(timer, "kills-its-parent")
-    assert isinstance(found, Outcome)
-    assert "ended by signal SIGKILL" in found.cause
+    result = timed(timer, "kills-its-parent")
+    assert isinstance(result, Outcome)
+    assert "ended by signal SIGKILL" in result.cause
     assert isinstance(timed(timer, "good"), Round)
     assert timer.launcher.forks
 

@@ -38,13 +38,13 @@ def assert_server_gone(run):
 
 
 def servers_of(run):
-    found = []
+    collected = []
     for one in psutil.process_iter():
         with suppress(psutil.Error):
             command = one.cmdline()
             if "cembench.running.fork_server" in command and str(run) in command:
-                found.append(one)
-    return found
+                collected.append(one)
+    return collected
 
 
 @pytest.mark.parametrize("kills", [3, pytest.param(20, marks=pytest.mark.slow)])
@@ -58,9 +58,9 @@ def test_a_run_killed_at_random_moments_loses_nothing_that_was_finished(tmp_path
         os.kill(run.pid, signal.SIGKILL)
         run.communicate()
         assert_server_gone(run.pid)
-        found = {path.name: path.read_bytes() for path in folder.glob("records/*.json")}
-        assert {name: found[name] for name in kept} == kept
-        kept = found
+        by_key = {path.name: path.read_bytes() for path in folder.glob("records/*.json")}
+        assert {name: by_key[name] for name in kept} == kept
+        kept = by_key
         Store(folder).finished()  # each can be read
         for journal in folder.glob("samples/*/*.jsonl"):
             Samples(journal).rounds()

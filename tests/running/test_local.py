@@ -86,8 +86,8 @@ def test_a_large_surface_that_memory_cannot_take_is_not_tried(monkeypatch):
 def test_what_is_short_of_memory_beside_others_is_checked_alone(monkeypatch, tmp_path):
     monkeypatch.setattr("cembench.running.timing.expected_bytes", lambda *_: 0.75 * MEMORY)
     options = Options(memory_bytes=MEMORY, jobs=2)
-    found = run_tasks(tasks_of("good", "harmonic-circle"), Store(tmp_path), options)
-    assert [record.outcome.status for record in found] == ["ok", "ok"]
+    records = run_tasks(tasks_of("good", "harmonic-circle"), Store(tmp_path), options)
+    assert [record.outcome.status for record in records] == ["ok", "ok"]
 
 
 def test_what_does_not_end_is_ended(tmp_path):
@@ -117,9 +117,9 @@ def test_a_run_over_the_unruly_measures_the_good(tmp_path):
     left = ("forks", "detaches", "detaches-twice", "daemonises")
     others = [name for name in expected if name not in left]
     options = Options(memory_bytes=MEMORY)
-    found = run_tasks(tasks_of(*others), Store(tmp_path / "others"), options)
-    found += run_tasks(tasks_of(*left), Store(tmp_path / "left"), Options())
-    outcomes = {record.cell.algorithm: record.outcome for record in found}
+    records = run_tasks(tasks_of(*others), Store(tmp_path / "others"), options)
+    records += run_tasks(tasks_of(*left), Store(tmp_path / "left"), Options())
+    outcomes = {record.cell.algorithm: record.outcome for record in records}
     assert {outcomes[name].status for name in left} <= {"ok", "not_comparable"}
     assert {name: o.status for name, o in outcomes.items() if name not in left} == {
         name: status for name, (status, _) in expected.items() if name not in left
@@ -152,12 +152,12 @@ def test_what_a_process_does_to_its_answer_or_to_the_others_fails_it_alone(tmp_p
         "good": ("ok", None),
     }
     store = Store(tmp_path)
-    found = run_tasks(tasks_of(*expected), store)
-    outcomes = {record.cell.algorithm: record.outcome for record in found}
+    records = run_tasks(tasks_of(*expected), store)
+    outcomes = {record.cell.algorithm: record.outcome for record in records}
     for name, (status, cause) in expected.items():
         assert outcomes[name].status == status, (name, outcomes[name].cause)
         assert cause is None or cause in outcomes[name].cause
-    assert run_tasks(tasks_of(*expected), store) == found
+    assert run_tasks(tasks_of(*expected), store) == records
 
 
 @pytest.mark.parametrize(
@@ -198,12 +198,12 @@ def test_a_good_one_is_measured_and_its_map_is_the_bare_call_s(tmp_path):
 @pytest.mark.skipif(not can_fork(1), reason="processes cannot be forked here")
 def test_the_memory_of_a_call_means_the_same_in_forked_and_started_processes(tmp_path):
     (task,) = tasks_of("good", faces=20_000)
-    found = {}
+    by_name = {}
     for forks in (True, False):
         with closing(CellTimer(tmp_path / str(forks), Options(), forks=forks)) as timer:
-            found[forks], _ = timer.check(task)
-    assert found[True].uv_hash == found[False].uv_hash
-    increases = [found[forks].memory_increase_bytes for forks in (True, False)]
+            by_name[forks], _ = timer.check(task)
+    assert by_name[True].uv_hash == by_name[False].uv_hash
+    increases = [by_name[forks].memory_increase_bytes for forks in (True, False)]
     assert abs(increases[0] - increases[1]) < 4 * 2**20, increases
     assert min(increases) > 8 * (3 * task.mesh.n + 2 * task.mesh.n), "the call's arrays at least"
 
@@ -331,9 +331,9 @@ def test_threads_are_pinned_for_the_cell_s_process():
 def test_timed_processes_keep_their_memory_unless_the_user_decides(monkeypatch, own):
     monkeypatch.setenv("GLIBC_TUNABLES", own)
     settings = for_measuring(1)["GLIBC_TUNABLES"]
-    found = dict(one.split("=") for one in settings.split(":"))
-    assert found == ALLOCATOR | dict(one.split("=") for one in own.split(":") if one)
-    assert len(found) == settings.count("=")
+    by_name = dict(one.split("=") for one in settings.split(":"))
+    assert by_name == ALLOCATOR | dict(one.split("=") for one in own.split(":") if one)
+    assert len(by_name) == settings.count("=")
     assert describe_environment()["allocator"]["settings"] == settings
 
 

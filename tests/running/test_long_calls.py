@@ -24,6 +24,6 @@ def test_a_long_call_is_timed_at_once_and_a_short_one_after_a_warm_up(monkeypatc
 
     mesh = generate_surface(load_registry(), "flat-disk", 50)
     cell = Cell(algorithm="counted", code_hash="", mesh="flat-disk", mesh_hash=mesh.hash)
-    found = time_cell(counted.__cembench__, mesh, cell, Checked())
+    result = time_cell(counted.__cembench__, mesh, cell, Checked())
     assert len(made) == calls
-    assert len(found.calls) == max(1, calls - 1)
+    assert len(result.calls) == max(1, calls - 1)

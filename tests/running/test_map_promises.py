@@ -73,12 +73,12 @@ def test_crowded_boundaries_are_ok_as_long_as_doubles_tell_them_apart(exponent):
     on_circle = uv[DISK.boundary] / np.abs(uv[DISK.boundary])
     uv[DISK.boundary] = on_circle
     coincide = len(np.unique(on_circle)) < len(on_circle)
-    found = kinds(uv)
+    faults = kinds(uv)
     flipped = np.count_nonzero(orientations(uv, DISK.F) <= 0)
-    assert (FaultKind.FOLDED in found) == bool(flipped)
+    assert (FaultKind.FOLDED in faults) == bool(flipped)
     assert flipped or not coincide
     if exponent == 9:
-        assert found == []
+        assert faults == []
 
 
 def test_an_overlapping_free_boundary_is_told_and_not_refused():

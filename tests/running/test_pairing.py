@@ -28,12 +28,12 @@ def test_the_scatter_between_processes_is_told_from_that_within_one():
     rng = np.random.default_rng(5)
     process = rng.normal(0, 0.1, 4000)
     pairs = np.exp(process[:, None] + rng.normal(0, 0.02, (4000, 2)))
-    found = Scatter.of([tuple(pair) for pair in pairs])
-    assert found.separate == pytest.approx(0.1 * 2**0.5, rel=0.05)
-    assert found.together == pytest.approx(0.02 * 2**0.5, rel=0.05)
-    assert found.pairing_is_narrower
+    scatter = Scatter.of([tuple(pair) for pair in pairs])
+    assert scatter.separate == pytest.approx(0.1 * 2**0.5, rel=0.05)
+    assert scatter.together == pytest.approx(0.02 * 2**0.5, rel=0.05)
+    assert scatter.pairing_is_narrower
     assert not Scatter(0.03, 0.03).pairing_is_narrower
-    assert found.half_width(28, pairs=True) < found.half_width(28, pairs=False) / 4
+    assert scatter.half_width(28, pairs=True) < scatter.half_width(28, pairs=False) / 4
 
 
 @pytest.mark.parametrize(
@@ -55,8 +55,8 @@ def test_the_expected_width_is_that_of_the_interval():
     widths = []
     for _ in range(200):
         ours, theirs = np.exp(rng.normal(0, 0.05, (2, 20)))
-        found = cembench.results.comparison.compare_ratios(list(ours / theirs), 0.1)
-        widths.append((found.interval.high - found.interval.low) / (2 * found.ratio))
+        comparison = cembench.results.comparison.compare_ratios(list(ours / theirs), 0.1)
+        widths.append((comparison.interval.high - comparison.interval.low) / (2 * comparison.ratio))
     expected = Scatter(0.05 * 2**0.5, 0.0).half_width(20, pairs=False)
     assert np.median(widths) == pytest.approx(expected, rel=0.15)
 
@@ -110,11 +110,11 @@ def test_where_processes_scatter_most_algorithms_share_one_and_the_run_says_what
     assert "7 rounds of each cell make ratios certain to ±" in listening.said[0]
     by_name = {r.cell.algorithm: r for r in records if r.cell.mesh == "100"}
     for name in ("lscm", "fdm", "ldm"):
-        found = compare(by_name[name], by_name["cem"])
-        assert found.together
-        assert 1 in found.disturbance
-        assert found.rounds == len(paired_ratios(by_name[name], by_name["cem"])) == 7
-        assert (found.interval.high - found.interval.low) / 2 < 0.05
+        comparison = compare(by_name[name], by_name["cem"])
+        assert comparison.together
+        assert 1 in comparison.disturbance
+        assert comparison.rounds == len(paired_ratios(by_name[name], by_name["cem"])) == 7
+        assert (comparison.interval.high - comparison.interval.low) / 2 < 0.05
     assert "within one process" in scatter_words(records)
 
 
@@ -157,13 +157,13 @@ def measured(names, mesh, folder, rounds, plugins=()):
     chosen = [registry.algorithm(name) for name in names]
     how = MeasurementSettings(repeats=rounds)
     tasks = plan_cells(chosen, [mesh], {}, how, plugins)
-    found = run_tasks(tasks, Store(folder), Options(pairing="process"))
-    return {record.cell.algorithm: record for record in found}
+    records = run_tasks(tasks, Store(folder), Options(pairing="process"))
+    return {record.cell.algorithm: record for record in records}
 
 
 def test_every_round_has_both_kinds_of_processes(tmp_path):
-    found = measured(["cem", "harmonic-circle"], flat_disk(300), tmp_path, 2)
-    for record in found.values():
+    scatter = measured(["cem", "harmonic-circle"], flat_disk(300), tmp_path, 2)
+    for record in scatter.values():
         assert record.outcome.status == "ok"
         for one in record.outcome.rounds:
             assert len(one.calls) > 1
@@ -178,22 +178,22 @@ def test_one_process_makes_the_calls_of_twins(tmp_path):
     try:
         outcome, _ = timer.check(task)
         checked = cembench.running.map_checks.Checked.of(outcome)
-        found = timer.together([task, task], [checked, checked])
+        result = timer.together([task, task], [checked, checked])
     finally:
         timer.close()
-    assert len(found) == 2
-    assert all(one.repeated is not False for one in found)
-    assert found[0].motions != found[1].motions
+    assert len(result) == 2
+    assert all(one.repeated is not False for one in result)
+    assert result[0].motions != result[1].motions
     assert PROCESSES >= 10
 
 
 def test_who_slows_its_neighbours_is_not_faster(surface, tmp_path):  # noqa: F811
     names = ["honest", "slows-others"]
-    found = measured(names, surface, tmp_path / "run", 7, [str(CHEATS)])
-    compared = compare(found["slows-others"], found["honest"])
+    scatter = measured(names, surface, tmp_path / "run", 7, [str(CHEATS)])
+    compared = compare(scatter["slows-others"], scatter["honest"])
     assert compared.disturbance.high < 1
     assert not compared.together
-    alone = compare(*(apart(found[name]) for name in ("slows-others", "honest")))
+    alone = compare(*(apart(scatter[name]) for name in ("slows-others", "honest")))
     assert compared.ratio == pytest.approx(alone.ratio)
     assert compared.verdict in (alone.verdict, "undecided")
 

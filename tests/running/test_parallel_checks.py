@@ -63,9 +63,9 @@ def states(tasks):
 def test_as_many_checks_run_at_a_time_as_there_are_checkers():
     barrier = threading.Barrier(2)  # no check ends unless another one runs beside it
     checkers = [Checker(barrier) for _ in range(2)]
-    found = list(check_in_parallel(states("abcd"), checkers, unwatched))
-    assert sorted(state.task for state, _ in found) == ["a", "b", "c", "d"]
-    assert all(outcome == (f"outcome of {state.task}", None) for state, outcome in found)
+    results = list(check_in_parallel(states("abcd"), checkers, unwatched))
+    assert sorted(state.task for state, _ in results) == ["a", "b", "c", "d"]
+    assert all(outcome == (f"outcome of {state.task}", None) for state, outcome in results)
     assert Checker.most == 2
     assert not any(checker.stopped.is_set() for checker in checkers)
 

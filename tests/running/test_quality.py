@@ -67,8 +67,8 @@ def notes_on(target, mesh, uv, extras):
 @pytest.mark.parametrize("algorithm", [cem, direct_cem])
 def test_conformal_maps_get_no_note(algorithm):
     mesh = hemi_ellipsoid(800, x=2.0)
-    found = algorithm(mesh)
-    assert notes_on("disk", mesh, found.uv, found.extras) == []
+    result = algorithm(mesh)
+    assert notes_on("disk", mesh, result.uv, result.extras) == []
 
 
 def test_a_map_with_hardly_any_angle_error_is_not_compared(monkeypatch):
@@ -86,8 +86,8 @@ def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
 
 def test_with_holes_the_yardstick_has_the_same_boundary_outside():
     mesh = warped()
-    found = direct_cem_holes(mesh)
-    assert notes_on("circular holes", mesh, found.uv, found.extras) == []
+    result = direct_cem_holes(mesh)
+    assert notes_on("circular holes", mesh, result.uv, result.extras) == []
     hole = mesh.outer_and_holes()[1][0]
     turned = harmonic_filled(mesh, outer=int(hole[0])).uv
     known = yardstick("circular holes", MapFigures(mesh, turned))

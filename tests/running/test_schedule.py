@@ -74,8 +74,8 @@ def rounds_of(records):
 def test_what_is_precise_drops_out_and_the_reference_stays_beside_the_rest(tmp_path):
     noting = Noting()
     records = run_tasks(cells(), Store(tmp_path), Options(most_rounds=40), noting, Invented)
-    found = rounds_of(records)
-    assert found == {"cem": 40, "lscm": 7, "fdm": 40}
+    rounds = rounds_of(records)
+    assert rounds == {"cem": 40, "lscm": 7, "fdm": 40}
     by_name = {record.cell.algorithm: record for record in records}
     assert len(paired_ratios(by_name["fdm"], by_name["cem"])) == 40
     assert not is_unstable(by_name["lscm"])

@@ -62,8 +62,8 @@ def test_more_cores_than_allowed_and_work_beside_the_calls_are_found(used, runni
 )
 def test_times_that_cannot_be_are_refused(told, is_refused):
     used = Used(**{"wall": 1.0, "cold": 1.0, "began": 101.0, "ended": 109.0} | told)
-    found = impossible(used, Round(calls=(1.0,)), 100.0, 110.0)
-    assert [f.kind for f in found] == [FaultKind.IMPOSSIBLE_TIMES] * is_refused
+    faults = impossible(used, Round(calls=(1.0,)), 100.0, 110.0)
+    assert [f.kind for f in faults] == [FaultKind.IMPOSSIBLE_TIMES] * is_refused
 
 
 def test_a_first_call_far_above_the_later_ones_is_cold():
@@ -133,9 +133,9 @@ def test_the_map_of_another_shape_is_a_kept_one_unless_no_coordinates_count():
 def test_the_same_surface_has_the_same_map_to_rounding_in_every_process():
     assert judged([(UNMOVED, FLAT)]).repeated is True
     assert judged([("a", turned(1e-6))], {"a": turned(1e-6 + 1e-12)}).repeated is True
-    found = judged([("a", turned(1e-6))], {"a": turned(0.1)})
-    assert (found.repeated, found.kept) == (False, ())
-    assert found.apart == pytest.approx(0.1, rel=1e-2)
+    result = judged([("a", turned(1e-6))], {"a": turned(0.1)})
+    assert (result.repeated, result.kept) == (False, ())
+    assert result.apart == pytest.approx(0.1, rel=1e-2)
 
 
 @pytest.mark.parametrize(
@@ -146,15 +146,15 @@ def test_the_same_surface_has_the_same_map_to_rounding_in_every_process():
     ],
 )
 def test_maps_of_used_processes_may_differ_as_far_as_those_of_fresh_ones(apart, scatter, is_kept):
-    found = kept_from_call_to_call(apart, scatter)
-    assert (found is not None and found.kind is FaultKind.KEPT_RESULT) == is_kept
+    fault = kept_from_call_to_call(apart, scatter)
+    assert (fault is not None and fault.kind is FaultKind.KEPT_RESULT) == is_kept
 
 
 def test_a_worse_map_is_doubtful_until_a_fresh_process_has_made_it_too():
     worse = FLAT.copy()
     worse[MESH.interior] *= 0.99
-    found = judged([("a", worse)], {UNMOVED: FLAT})
-    assert (found.faults, found.doubtful) == ((), "a")
+    result = judged([("a", worse)], {UNMOVED: FLAT})
+    assert (result.faults, result.doubtful) == ((), "a")
     assert judged([("a", worse)], {"a": worse}).faults == ()
     kinds = [f.kind for f in judged([("a", worse)], {"a": FLAT}).faults]
     assert kinds == [FaultKind.OTHER_MAP, FaultKind.OTHER_ENERGY]

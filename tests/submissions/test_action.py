@@ -85,8 +85,8 @@ def test_a_program_is_judged_by_its_command(tmp_path):
 def test_no_text_of_an_input_becomes_part_of_a_script(file):
     files = [file] if file.is_file() else [*file.rglob("*.yml")]
     for one in files:
-        found = yaml.safe_load(one.read_text())
-        jobs = [found["runs"]] if "runs" in found else found["jobs"].values()
+        parsed = yaml.safe_load(one.read_text())
+        jobs = [parsed["runs"]] if "runs" in parsed else parsed["jobs"].values()
         assert not [s for job in jobs for s in job["steps"] if "${{" in s.get("run", "")]
 
 

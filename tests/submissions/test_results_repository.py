@@ -92,8 +92,8 @@ def test_the_example_accepts_two_bundles_and_refuses_four(bundles, tmp_path):
     check = steps_of(WORKFLOW, "check")["Check"]
     code, said, summary = run_step(check, repository)
     assert code == 1, said
-    found = dict(re.findall(r"^\| ([\w-]+) \| (accepted|refused) \|", summary, re.MULTILINE))
-    assert found == {
+    by_name = dict(re.findall(r"^\| ([\w-]+) \| (accepted|refused) \|", summary, re.MULTILINE))
+    assert by_name == {
         **{"node-1": "accepted", "node-2": "accepted"},
         **dict.fromkeys(("forged", "impossible", "foreign", "link"), "refused"),
     }
@@ -338,10 +338,10 @@ def test_surfaces_of_unknown_licence_are_not_sent(tmp_path):
     run = machine_run(tmp_path / "run", 1, mesh="my-face")
     for licence, sent in ((None, 0), ("CC0-1.0", 1)):
         path = tmp_path / f"{licence}.zip"
-        found = cembench.submit(run.folder, path, maps=True, surfaces_licence=licence)
+        result = cembench.submit(run.folder, path, maps=True, surfaces_licence=licence)
         with zipfile.ZipFile(path) as archive:
             assert len([n for n in archive.namelist() if n.startswith("meshes/")]) == 2 + sent
-        assert found.maps == 10 + 5 * sent
+        assert result.maps == 10 + 5 * sent
 
 
 def test_what_cannot_be_submitted_is_said(bundles, tmp_path):

@@ -10,8 +10,8 @@ import yaml
 
 def steps_of(file, job=None):
     """The steps of a job, or of an action, by their names."""
-    found = yaml.safe_load(Path(file).read_text())
-    steps = found["jobs"][job]["steps"] if job else found["runs"]["steps"]
+    parsed = yaml.safe_load(Path(file).read_text())
+    steps = parsed["jobs"][job]["steps"] if job else parsed["runs"]["steps"]
     return {step["name"]: step for step in steps if "name" in step}
 
 

@@ -38,15 +38,15 @@ def fault(kind):
 
 
 def test_ratios_within_one_percent_are_ties():
-    found = sides([0.5, 0.98, 0.995, 1.0, 1.009, 1.02, 3.0])
-    assert (found.lower, found.equal, found.higher, found.surfaces) == (2, 3, 2, 7)
-    assert found.ratio == pytest.approx(1.0)
+    pair = sides([0.5, 0.98, 0.995, 1.0, 1.009, 1.02, 3.0])
+    assert (pair.lower, pair.equal, pair.higher, pair.surfaces) == (2, 3, 2, 7)
+    assert pair.ratio == pytest.approx(1.0)
 
 
 def test_an_interval_needs_six_surfaces():
     assert sides([0.9] * 5).low is None
-    found = sides([0.7, 0.8, 0.9, 0.95, 1.0, 1.1])
-    assert (found.low, found.high) == (0.7, 1.1)
+    pair = sides([0.7, 0.8, 0.9, 0.95, 1.0, 1.1])
+    assert (pair.low, pair.high) == (0.7, 1.1)
     assert sides([]).ratio is None
 
 
@@ -54,12 +54,12 @@ def test_pairs_are_by_surface_and_only_of_valid_maps():
     records = [record("ours", f"s{k}", 0.008) for k in range(3)]
     records += [record("cem", f"s{k}", 0.01) for k in range(4)]
     records[2] = folded("s2")
-    found = comparison_with(records, "ours", "cem")
-    assert (found.energy.lower, found.energy.surfaces) == (2, 2)
-    assert found.energy.ratio == pytest.approx(0.8)
-    assert found.pairs[2].energy is None
-    assert found.pairs[2].baseline_energy == 0.01
-    assert found.speed is None
+    comparison = comparison_with(records, "ours", "cem")
+    assert (comparison.energy.lower, comparison.energy.surfaces) == (2, 2)
+    assert comparison.energy.ratio == pytest.approx(0.8)
+    assert comparison.pairs[2].energy is None
+    assert comparison.pairs[2].baseline_energy == 0.01
+    assert comparison.speed is None
 
 
 def test_energies_that_are_rounding_are_equal():
@@ -69,9 +69,9 @@ def test_energies_that_are_rounding_are_equal():
 
 def test_energies_of_different_targets_are_divided_by_the_area():
     records = [record("ours", "s", 0.01, target="free boundary"), record("cem", "s", 0.01)]
-    found = comparison_with(records, "ours", "cem")
-    assert found.relative
-    assert found.pairs[0].energy == pytest.approx(0.01 / 3.14)
+    comparison = comparison_with(records, "ours", "cem")
+    assert comparison.relative
+    assert comparison.pairs[0].energy == pytest.approx(0.01 / 3.14)
 
 
 def test_speed_is_judged_over_rounds_paired_on_every_surface():
@@ -137,24 +137,22 @@ def test_nothing_in_common_is_an_error():
 
 def in_gauge(algorithm, mesh, energy, gauge):
     """A record whose map has another energy in the common gauge; None: it has none there."""
-    found = record(algorithm, mesh, energy)
-    metrics = found.outcome.metrics | ({} if gauge is None else {"common_gauge_energy": gauge})
-    return found.model_copy(
-        update={"outcome": found.outcome.model_copy(update={"metrics": metrics})}
-    )
+    made = record(algorithm, mesh, energy)
+    metrics = made.outcome.metrics | ({} if gauge is None else {"common_gauge_energy": gauge})
+    return made.model_copy(update={"outcome": made.outcome.model_copy(update={"metrics": metrics})})
 
 
 def test_two_disks_are_compared_in_the_common_gauge():
     records = [in_gauge("ours", "a", 0.02, 0.01), in_gauge("cem", "a", 0.01, 0.02)]
-    found = comparison_with(records, "ours", "cem")
-    assert found.common_gauge
-    assert found.energy_name == "E_C in the common gauge"
-    assert found.energy.ratio == pytest.approx(0.5)
+    comparison = comparison_with(records, "ours", "cem")
+    assert comparison.common_gauge
+    assert comparison.energy_name == "E_C in the common gauge"
+    assert comparison.energy.ratio == pytest.approx(0.5)
 
 
 def test_records_without_that_gauge_are_compared_as_they_are():
     records = [in_gauge("ours", "a", 0.02, None), in_gauge("cem", "a", 0.01, 0.02)]
-    found = comparison_with(records, "ours", "cem")
-    assert not found.common_gauge
-    assert found.energy_name == "E_C"
-    assert found.energy.ratio == pytest.approx(2)
+    comparison = comparison_with(records, "ours", "cem")
+    assert not comparison.common_gauge
+    assert comparison.energy_name == "E_C"
+    assert comparison.energy.ratio == pytest.approx(2)

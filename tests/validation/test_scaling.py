@@ -25,10 +25,10 @@ EVEN = [1.0] * 7
 def timed(name, faces, walls, cpus=None, phase=0.5):
     """A record of these seconds, one a round."""
     one = record(name, f"s{faces}", seconds=walls)
-    told = zip(one.outcome.rounds, walls, cpus or walls, strict=True)
+    pairs = zip(one.outcome.rounds, walls, cpus or walls, strict=True)
     rounds = tuple(
         r.model_copy(update={"phases": {"factorisation": phase * wall}, "cpu_seconds": cpu})
-        for r, wall, cpu in told
+        for r, wall, cpu in pairs
     )
     outcome = one.outcome.model_copy(update={"rounds": rounds})
     mesh = one.mesh.model_copy(update={"faces": faces})

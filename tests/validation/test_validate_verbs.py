@@ -35,19 +35,19 @@ def test_a_right_solver_is_valid_and_its_page_is_written(here):
     page = (here.folder / "there/index.html").read_text()
     for words in ("Validation of Right", "valid; ", "Seconds against triangles"):
         assert words in page
-    found = json.loads((here.folder / "there/validation.json").read_text())
-    assert [a["baseline"] for a in found["against"]] == ["cem", "lscm"]
+    data = json.loads((here.folder / "there/validation.json").read_text())
+    assert [a["baseline"] for a in data["against"]] == ["cem", "lscm"]
     (record, *_) = (here.folder / "there/quality/records").glob("*.json")
     assert Record.model_validate_json(record.read_bytes()).outcome.status == "ok"
 
 
 def test_a_wrong_one_is_invalid_and_the_stages_behind_are_not_reached(here):
     code, out, _ = here("off-circle", "--json", *TINY)
-    found = json.loads(out)
+    data = json.loads(out)
     assert code == 1
-    assert found["verdict"].startswith("invalid: boundary: up to 1.0e-03 off the circle")
-    assert (found["valid"], found["passed"], found["against"]) == (False, False, [])
-    assert found["skipped"].keys() == {"quality", "scaling"}
+    assert data["verdict"].startswith("invalid: boundary: up to 1.0e-03 off the circle")
+    assert (data["valid"], data["passed"], data["against"]) == (False, False, [])
+    assert data["skipped"].keys() == {"quality", "scaling"}
     assert not list(here.folder.iterdir())
 
 
@@ -68,12 +68,12 @@ def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
     named = ("--surfaces", "hemi-ellipsoid,cone,flat-disk", *TINY[2:4], "--repeats", 1)
     required = ("--require", "no-folds", "--require", "not-worse")
     code, out, _ = here("folds-sometimes", *named, "--up-to", 0, *required, "--json")
-    found = json.loads(out)
-    assert found["verdict"].endswith(
+    data = json.loads(out)
+    assert data["verdict"].endswith(
         "folds on 1 surface: flat-disk; no map of 1 surface: cone; required and not met: no-folds"
     )
-    assert found["no_map_on"] == {"cone": "no cones"}
-    assert (found["valid"], found["passed"], code) == (True, False, 1)
+    assert data["no_map_on"] == {"cone": "no cones"}
+    assert (data["valid"], data["passed"], code) == (True, False, 1)
 
 
 def test_what_remembers_its_calls_is_caught_in_the_rounds(here):

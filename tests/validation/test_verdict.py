@@ -17,7 +17,7 @@ def finding(name, measured, ok):
 
 def against(title="CEM", energy=(17, 0, 3, 0.93, 0.90, 0.96), speed=(0.55, 0.53, 0.58, "faster")):
     counts = dict(zip(("lower", "equal", "higher", "ratio", "low", "high"), energy, strict=True))
-    found = PairedComparison(**counts)
+    comparison = PairedComparison(**counts)
     timed = None
     if speed:
         ratio, low, high, verdict = speed
@@ -27,8 +27,8 @@ def against(title="CEM", energy=(17, 0, 3, 0.93, 0.90, 0.96), speed=(0.55, 0.53,
         title=title,
         relative=False,
         pairs=(),
-        energy=found,
-        angle=found,
+        energy=comparison,
+        angle=comparison,
         speed=timed,
     )
 

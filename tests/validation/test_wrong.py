@@ -74,10 +74,10 @@ def test_the_families_of_the_field_are_right(name):
 
 
 def test_rates_are_told_and_not_judged_where_no_conformal_map_is_promised():
-    found = {finding.name: finding for finding in examined("harmonic-circle", None)}
-    assert all(finding.ok for finding in found.values())
+    by_key = {finding.name: finding for finding in examined("harmonic-circle", None)}
+    assert all(finding.ok for finding in by_key.values())
     for name in ("E_C under refinement", "angle error under refinement", "modulus"):
-        assert found[name].measured.endswith("; it does not promise a conformal map")
+        assert by_key[name].measured.endswith("; it does not promise a conformal map")
     # The same maps under another name promise it.
     assert not all(finding.ok for finding in examined("not-conformal"))
     validation = Validation(
@@ -89,15 +89,15 @@ def test_rates_are_told_and_not_judged_where_no_conformal_map_is_promised():
         conformal=False,
         command="",
         environment="",
-        findings=tuple(found.values()),
+        findings=tuple(by_key.values()),
     )
     assert sentence(validation) == "valid; not conformal, which it does not promise"
 
 
 def test_the_modulus_of_four_points_is_told_with_its_certificate():
-    told = [f.measured for f in examined("right") if f.name == "modulus"]
-    assert [line.split(" off by")[0] for line in told] == ["on spherical-cap", "on hemi-ellipsoid"]
-    for line in told:
+    items = [f.measured for f in examined("right") if f.name == "modulus"]
+    assert [line.split(" off by")[0] for line in items] == ["on spherical-cap", "on hemi-ellipsoid"]
+    for line in items:
         off, gaps = (
             [float(x) for x in part.split(",")]
             for part in line.split(" off by ")[1].split("; reciprocal error ")
@@ -110,6 +110,6 @@ def test_a_solver_without_a_fault_has_none():
 
 
 def test_holes_that_are_no_circles_are_found_and_the_maps_laid_on_the_exact_ones():
-    found = examined("harmonic-filled", None)
-    assert [finding.name for finding in found if not finding.ok] == ["boundary"]
-    assert sum(finding.name == "exact map" for finding in found) == 2
+    checks = examined("harmonic-filled", None)
+    assert [finding.name for finding in checks if not finding.ok] == ["boundary"]
+    assert sum(finding.name == "exact map" for finding in checks) == 2

@@ -60,15 +60,15 @@ def writes(mesh: DiskMesh) -> Parameterization:
 
 @algorithm("boasts", title="Reports half of its energy", target="disk")
 def boasts(mesh: DiskMesh) -> Parameterization:
-    found = cem(mesh)
-    half = tuple(energy / 2 for energy in found.energy_history)
-    return Parameterization(found.uv, found.iterations, half)
+    result = cem(mesh)
+    half = tuple(energy / 2 for energy in result.energy_history)
+    return Parameterization(result.uv, result.iterations, half)
 
 
 @algorithm("miscounts", title="Reports fewer iterations than energies", target="disk")
 def miscounts(mesh: DiskMesh) -> Parameterization:
-    found = cem(mesh)
-    return Parameterization(found.uv, 1, found.energy_history)
+    result = cem(mesh)
+    return Parameterization(result.uv, 1, result.energy_history)
 
 
 @algorithm("by-chance", title="Random without a seed", target="disk")

@@ -21,14 +21,14 @@ def read_mat(data: bytes) -> Content:
     """Read v (n, 3) and f (m, 3), corners counted from 1, or the only two variables that fit."""
     # The text that opens level 5 has no zero in its first four bytes; a number of level 4 has.
     is_level_5 = 0 not in data[:4] or data[124:128] in (b"\0\1IM", b"\1\0MI")
-    found = dict(_level_5(data) if is_level_5 else _level_4(data))
-    v, f = ("v", "f") if {"v", "f"} <= set(found) else _only_pair(found)
+    by_name = dict(_level_5(data) if is_level_5 else _level_4(data))
+    v, f = ("v", "f") if {"v", "f"} <= set(by_name) else _only_pair(by_name)
     points, polygons = [], []
-    for row in found[v]:
+    for row in by_name[v]:
         if len(row) != 3:
             raise Damaged(f"v has {len(row)} columns")
         points.append(tuple(finite(float(x)) for x in row))
-    for row in found[f]:
+    for row in by_name[f]:
         if len(row) != 3 or any(finite(x) != int(x) for x in row):
             raise Damaged("f does not hold whole numbers in three columns")
         polygons.append(tuple(int(x) - 1 for x in row))

@@ -50,18 +50,18 @@ def read_ply(data: bytes) -> Content:
     if sorted(set(names)) != sorted(names):
         raise Damaged("an element is declared twice")
     if form == "ascii":
-        found = _text(elements, body)
+        contents = _text(elements, body)
     else:
-        found = _binary(elements, body, "<" if form == "binary_little_endian" else ">")
-    if "vertex" not in found or "face" not in found:
+        contents = _binary(elements, body, "<" if form == "binary_little_endian" else ">")
+    if "vertex" not in contents or "face" not in contents:
         raise Damaged("no element vertex or no element face")
     points = []
-    for row in found["vertex"]:
+    for row in contents["vertex"]:
         if not all(isinstance(row.get(name), (int, float)) for name in "xyz"):
             raise Damaged("a vertex without x, y and z")
         points.append(tuple(finite(float(row[name])) for name in "xyz"))  # type: ignore[arg-type]
     polygons = []
-    for row in found["face"]:
+    for row in contents["face"]:
         corners = next((row[name] for name in _LISTS if name in row), None)
         if not isinstance(corners, tuple) or any(isinstance(k, float) for k in corners):
             raise Damaged("a face without a list of vertex indices")

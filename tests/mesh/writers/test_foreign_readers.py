@@ -38,48 +38,48 @@ def seamed(surface):
 
 
 def by_trimesh(path):
-    found = trimesh.load_mesh(path, process=False)
-    return found.vertices[found.faces], found.visual.uv[found.faces]
+    loaded = trimesh.load_mesh(path, process=False)
+    return loaded.vertices[loaded.faces], loaded.visual.uv[loaded.faces]
 
 
 def by_vtk(path):
-    found = pyvista.read(path)
-    F = found.regular_faces
-    return found.points[F], found.active_texture_coordinates[F]
+    loaded = pyvista.read(path)
+    F = loaded.regular_faces
+    return loaded.points[F], loaded.active_texture_coordinates[F]
 
 
 def by_meshlab(path):
     meshes = pymeshlab.MeshSet()
     meshes.load_new_mesh(str(path))
-    found = meshes.current_mesh()
-    F = found.face_matrix()
-    if found.has_wedge_tex_coord():
-        uv = found.wedge_tex_coord_matrix().reshape(-1, 3, 2)
+    loaded = meshes.current_mesh()
+    F = loaded.face_matrix()
+    if loaded.has_wedge_tex_coord():
+        uv = loaded.wedge_tex_coord_matrix().reshape(-1, 3, 2)
     else:
-        uv = found.vertex_tex_coord_matrix()[F]
-    return found.vertex_matrix()[F], uv
+        uv = loaded.vertex_tex_coord_matrix()[F]
+    return loaded.vertex_matrix()[F], uv
 
 
 def by_pygltflib(path):
-    found = pygltflib.GLTF2.load(path)
-    (primitive,) = found.meshes[0].primitives
+    loaded = pygltflib.GLTF2.load(path)
+    (primitive,) = loaded.meshes[0].primitives
 
     def array(index, columns):
-        accessor = found.accessors[index]
-        view = found.bufferViews[accessor.bufferView]
+        accessor = loaded.accessors[index]
+        view = loaded.bufferViews[accessor.bufferView]
         kind = {5126: "<f4", 5125: "<u4"}[accessor.componentType]
-        content = found.binary_blob()[view.byteOffset :][: view.byteLength]
+        content = loaded.binary_blob()[view.byteOffset :][: view.byteLength]
         return np.frombuffer(content, kind).reshape(accessor.count, columns)
 
     F = array(primitive.indices, 1).reshape(-1, 3)
-    V = array(primitive.attributes.POSITION, 3) + np.array(found.nodes[0].translation)
+    V = array(primitive.attributes.POSITION, 3) + np.array(loaded.nodes[0].translation)
     uv = array(primitive.attributes.TEXCOORD_0, 2)
     return V[F], (uv * [1, -1] + [0, 1])[F]
 
 
 def by_numpy(path):
-    found = np.load(path)
-    return found["V"][found["F"]], found["uv"][found["F_uv" if "F_uv" in found else "F"]]
+    loaded = np.load(path)
+    return loaded["V"][loaded["F"]], loaded["uv"][loaded["F_uv" if "F_uv" in loaded else "F"]]
 
 
 READERS = [
@@ -100,11 +100,11 @@ READERS = [
 def test_a_foreign_reader_finds_corners_and_texture_coordinates(
     name, read, which, request, tmp_path
 ):
-    given = request.getfixturevalue(which)
-    write_soup(tmp_path / name, given)
+    fixture = request.getfixturevalue(which)
+    write_soup(tmp_path / name, fixture)
     points, uv = read(tmp_path / name)
-    np.testing.assert_allclose(points, given.V[given.triangles], rtol=1e-6, atol=1e-6)
-    np.testing.assert_allclose(uv, columns(given.uv)[given.uv_triangles], atol=1e-6)
+    np.testing.assert_allclose(points, fixture.V[fixture.triangles], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(uv, columns(fixture.uv)[fixture.uv_triangles], atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["a.vtp", "a.npz"])
@@ -121,8 +121,8 @@ def test_glb_shows_the_texture_that_is_inside(surface, tmp_path):
     from cembench.drawing.texture import checker_png
 
     write_soup(tmp_path / "a.glb", surface, Texture(checker_png()))
-    found = trimesh.load_mesh(tmp_path / "a.glb")
-    picture = found.visual.material.baseColorTexture.convert("RGB")
+    loaded = trimesh.load_mesh(tmp_path / "a.glb")
+    picture = loaded.visual.material.baseColorTexture.convert("RGB")
     assert isinstance(picture, Image.Image)
     assert len(picture.getcolors()) == 2
 
@@ -132,9 +132,9 @@ def test_glb_holds_several_surfaces_and_one_texture(surface, tmp_path):
         replace(surface, V=surface.V + np.array([k, 0, 0]), name=f"part {k}") for k in range(2)
     ]
     (tmp_path / "a.glb").write_bytes(gltf.write(*parts, texture=Texture(b"\x89PNG")))
-    found = pygltflib.GLTF2.load(tmp_path / "a.glb")
-    assert [node.name for node in found.nodes] == ["part 0", "part 1"]
-    assert len(found.images) == len(found.textures) == len(found.materials) == 1
+    loaded = pygltflib.GLTF2.load(tmp_path / "a.glb")
+    assert [node.name for node in loaded.nodes] == ["part 0", "part 1"]
+    assert len(loaded.images) == len(loaded.textures) == len(loaded.materials) == 1
 
 
 @pytest.mark.parametrize("name", ["a.glb", "a.stl"])
@@ -174,8 +174,8 @@ def test_the_validator_of_khronos_finds_nothing(surface, seamed, tmp_path):
             f"v.validateBytes(new Uint8Array(fs.readFileSync('{k}.glb')))"
             ".then(r => console.log(JSON.stringify(r)))"
         )
-        told = subprocess.run(
+        result = subprocess.run(
             [node, "-e", script], cwd=tmp_path, capture_output=True, check=True, timeout=120
         )
-        issues = json.loads(told.stdout)["issues"]
+        issues = json.loads(result.stdout)["issues"]
         assert issues["numErrors"] == issues["numWarnings"] == 0, issues["messages"]

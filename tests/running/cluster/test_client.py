@@ -55,11 +55,11 @@ def tasks_of(*names, surfaces=SURFACES, plugin=FAULTY):
 
 def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_path):
     tasks = tasks_of("good", "nan")
-    here = run_tasks(tasks, Store(tmp_path / "here"))
+    records = run_tasks(tasks, Store(tmp_path / "here"))
     store, heard = Store(tmp_path / "there"), Listener()
     there = run_on_cluster(tasks, store, client, watcher=heard)
     assert [r.outcome.status for r in there] == ["ok", "invalid"] * 2
-    for a, b in zip(there, here, strict=True):
+    for a, b in zip(there, records, strict=True):
         assert a.cell == b.cell
         assert a.outcome.status == b.outcome.status
         assert a.outcome.uv_hash == b.outcome.uv_hash

@@ -98,11 +98,11 @@ class Cluster:
         if kind == "recorded":
             return set(self.records())
         names = {"taken": "*/run/cembench.json", "measured": "*/run/samples/*/*.jsonl"}
-        found = set()
+        inside = set()
         for path in self.cache.glob(f"cluster/units/{names[kind]}"):
             with suppress(FileNotFoundError):  # finished, and deleted
-                found.add((path, path.stat().st_mtime_ns))
-        return found
+                inside.add((path, path.stat().st_mtime_ns))
+        return inside
 
     def ends_well(self):
         """Wait for the client; whether it came to its end. All others must stay."""
@@ -160,10 +160,10 @@ def test_random_kills_lose_nothing_that_was_finished(tmp_path, kills):
             victim = chance.choice(others)
             if run_until_killed(cluster, chance, victim):
                 done += 1
-                found = cluster.records()
-                print(f"kill {done}: {victim}; {len(found)} cells are on disk", flush=True)
-                assert {name: found[name] for name in kept} == kept
-                kept = found
+                records = cluster.records()
+                print(f"kill {done}: {victim}; {len(records)} cells are on disk", flush=True)
+                assert {name: records[name] for name in kept} == kept
+                kept = records
             else:  # it came to its end: the next run
                 cluster.check_table()
                 cluster.end()
@@ -176,8 +176,8 @@ def test_random_kills_lose_nothing_that_was_finished(tmp_path, kills):
         cluster.check_table()
     finally:
         cluster.end()
-    found = cluster.records()
-    assert {name: found[name] for name in kept} == kept
+    records = cluster.records()
+    assert {name: records[name] for name in kept} == kept
 
 
 @pytest.mark.slow
@@ -204,6 +204,6 @@ def test_a_killed_client_leaves_nothing_behind_and_the_same_command_goes_on(tmp_
     finally:
         cluster.end()
     assert [row["status"] for row in rows] == ["ok", "invalid"] * 2
-    found = cluster.records()
-    assert len(found) == 4
-    assert {name: found[name] for name in kept} == kept
+    records = cluster.records()
+    assert len(records) == 4
+    assert {name: records[name] for name in kept} == kept

@@ -95,9 +95,9 @@ def test_more_machines_take_less_until_the_longest_unit_is_all(machines, seconds
 def test_hours_name_what_limits_them():
     tasks = two_surfaces("reuse")
     cost = Estimate(1.0, 100.0, 1e6, "recorded", 100.0)
-    found = hours(tasks, [cost, cost, replace(cost, seconds=700.0), cost], None)
-    assert found["seconds"] == {1: 1000.0, 10: 800.0, 100: 800.0}
-    assert (found["longest"], found["units"], found["useful"]) == ("two", 2, 2)
+    seconds = hours(tasks, [cost, cost, replace(cost, seconds=700.0), cost], None)
+    assert seconds["seconds"] == {1: 1000.0, 10: 800.0, 100: 800.0}
+    assert (seconds["longest"], seconds["units"], seconds["useful"]) == ("two", 2, 2)
     held = hours(tasks, [None, None, cost, cost], None)
     assert (held["units"], held["seconds"][10]) == (1, 200.0)
 
@@ -178,16 +178,16 @@ def test_what_nobody_came_back_for_is_deleted():
 def test_a_unit_comes_to_the_same_as_on_one_machine(tmp_path):
     tasks = tasks_of("good", "nan")
     unit = parcel(tasks, NO_TOKEN, Options()).unit
-    told = []
+    collected = []
     store = Store(tmp_path / "there")
-    there = measure(unit, tasks[0].mesh, store, Forwarder(told.append))
+    there = measure(unit, tasks[0].mesh, store, Forwarder(collected.append))
     assert [store.find(task.cell) for task in tasks] == there
-    here = run_tasks(tasks, Store(tmp_path / "here"))
-    for a, b in zip(there, here, strict=True):
+    records = run_tasks(tasks, Store(tmp_path / "here"))
+    for a, b in zip(there, records, strict=True):
         assert (a.cell, a.sources, a.outcome.status) == (b.cell, b.sources, b.outcome.status)
         assert a.outcome.uv_hash == b.outcome.uv_hash
-    assert {event["what"] for event in told} == {"starts", "ends"}
-    assert json.loads(json.dumps(told)) == told
+    assert {event["what"] for event in collected} == {"starts", "ends"}
+    assert json.loads(json.dumps(collected)) == collected
 
 
 def test_other_code_under_the_same_name_is_refused(tmp_path):

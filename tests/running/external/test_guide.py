@@ -91,9 +91,9 @@ def test_peers_are_measured_beside_ours_and_libigls_lscm_is_ours(typed, cli, mon
     assert len(energies) == 2
     assert energies[0] == energies[1]
     table = declared_table(Evidence.of(cli.folder / "results/peers"), "beside-others")
-    told = {(row[1].text, row[2].text): row[4].text for row in table.rows}
-    assert told["free boundary", "LSCM of libigl ‡"] == told["free boundary", "LSCM"]
-    assert ("disk", "CEM") in told
+    by_key = {(row[1].text, row[2].text): row[4].text for row in table.rows}
+    assert by_key["free boundary", "LSCM of libigl ‡"] == by_key["free boundary", "LSCM"]
+    assert ("disk", "CEM") in by_key
 
 
 def test_the_guide_names_every_key_format_fault_and_peer():

@@ -146,12 +146,16 @@ def test_comparisons_take_the_solve_time_and_never_the_wall_clock():
     ours = timed(*[Round(calls=(0.5,), start_seconds=0.3)] * 6)
     theirs = timed(*[Round(calls=(0.1,))] * 6).model_copy(update={"external": None})
     assert compare(ours, theirs).ratio == pytest.approx(2.0)
-    told = timed(*[Round(calls=(0.5,), start_seconds=0.3, own_seconds=(0.1,))] * 6)
-    assert compare(told, theirs).ratio == pytest.approx(1.0)
+    result = timed(*[Round(calls=(0.5,), start_seconds=0.3, own_seconds=(0.1,))] * 6)
+    assert compare(result, theirs).ratio == pytest.approx(1.0)
     # By its own word it is five times faster, by our clock twice as slow: that decides nothing.
     boasts = timed(*[Round(calls=(0.5,), start_seconds=0.3, own_seconds=(0.02,))] * 6)
-    found = compare(boasts, theirs)
-    assert (found.ratio, found.verdict, found.p) == (pytest.approx(0.2), "undecided", 1.0)
+    comparison = compare(boasts, theirs)
+    assert (comparison.ratio, comparison.verdict, comparison.p) == (
+        pytest.approx(0.2),
+        "undecided",
+        1.0,
+    )
     assert compare(theirs, boasts).verdict == "undecided"
     assert compare_speed([(boasts, theirs)]).verdict == "undecided"
     fast = timed(*[Round(calls=(0.35,), start_seconds=0.3, own_seconds=(0.02,))] * 6)
