@@ -172,7 +172,8 @@ def further(
             make: Any = declared_plot if of_plot else declared_table
             gap = f"{one.title}: no record of this run is in this {'plot' if of_plot else 'table'}."
             items.append(make(evidence, name, one, called=called) or Text(gap))
-        sections.append((Section(f"declared-{number}", f"Tables of {path.name}"), items))
+        source = "this paper" if path.parent == evidence.paper.folder else path.name
+        sections.append((Section(f"declared-{number}", f"Tables of {source}"), items))
     return sections
 
 

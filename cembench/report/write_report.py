@@ -21,7 +21,7 @@ from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable
 from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
-from cembench.report.content.report import Progress, build_report
+from cembench.report.content.report import Progress, build_report, is_of_the_paper
 from cembench.report.declared_plots import further
 from cembench.report.document import Report
 from cembench.report.export import export_rows, write_tables_csv
@@ -30,7 +30,7 @@ from cembench.report.plots import drawn
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.shared_drawing import shared_drawing
-from cembench.results.papers import Paper
+from cembench.results.papers import MEASURED, Paper
 from cembench.results.records import Record
 
 
@@ -48,8 +48,9 @@ def write_report(
     """Write the report of a run in all its forms; `jobs` processes draw its pictures and plots.
 
     `tables` are files with declarations of more tables and plots (:mod:`cembench.report.declared`,
-    :mod:`cembench.report.declared_plots`). `paper` is the one it is of; default: the one with most
-    rows of the run. `records` are those of the run, if they were read before.
+    :mod:`cembench.report.declared_plots`), after those of the paper's folder. `paper` is the one it
+    is of; default: the one with most rows of the run. `records` are those of the run, if they were
+    read before.
 
     Everything is made in a separate folder and moved when it is complete. Files of an earlier
     report that this one does not have are removed, unless they were changed; other files are left
@@ -68,7 +69,9 @@ def write_report(
     """
     require(Extra.REPORT, "a report")
     evidence = Evidence.of(run, paper, records)
-    declared = further(evidence, tables)
+    own = evidence.paper.folder / MEASURED
+    of_paper = [own] if is_of_the_paper(evidence) and own.is_file() else []
+    declared = further(evidence, [*of_paper, *tables])
     folders.check(folder, "report")
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

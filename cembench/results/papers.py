@@ -1,9 +1,10 @@
 """Papers: folders of data with printed tables, misprints, claims and how the paper was run.
 
 A folder holds `paper.toml`, `tables.toml` with the CSV files that it names and, if wanted,
-`runs.toml`, `figures.toml`, `claims.toml` and `checks.py`, the numerics of claims. `papers/cem` is
-an example. Installed papers are found by the entry points of the group ``cembench.papers``, each of
-which names the package that is the folder.
+`runs.toml`, `figures.toml`, `claims.toml`, `measured.toml` with tables and plots of what was
+measured, and `checks.py`, the numerics of claims. `papers/cem` is an example. Installed papers are
+found by the entry points of the group ``cembench.papers``, each of which names the package that is
+the folder.
 """
 
 from __future__ import annotations
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
 
 #: Group of the entry points of papers.
 GROUP = "cembench.papers"
+#: The file of a paper that declares tables and plots of what was measured, for its reports.
+MEASURED = "measured.toml"
 #: Files that a paper need not have.
 _OPTIONAL = ("runs.toml", "figures.toml", "claims.toml")
 #: Fields in which names in braces stand for words and numbers.

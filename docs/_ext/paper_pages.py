@@ -18,7 +18,6 @@ def write_pages(folder: Path) -> None:
         page = folder / run.name / "index.html"
         youngest = max(file.stat().st_mtime for file in run.rglob("*.json"))
         if not page.is_file() or page.stat().st_mtime < youngest:
-            own = sorted((ROOT / "papers" / run.name).glob("success.toml"))
-            # Relative paths: a page says which run it shows, and not on which machine.
-            shown, *tables = (Path(os.path.relpath(path)) for path in (run, *own))
-            cembench.Run(shown).report(page.parent, paper=run.name, tables=tables)
+            # A relative path: a page says which run it shows, and not on which machine.
+            shown = Path(os.path.relpath(run))
+            cembench.Run(shown).report(page.parent, paper=run.name)

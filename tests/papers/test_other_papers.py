@@ -203,8 +203,7 @@ def test_the_overlay_is_judged_on_the_refinement():
 
 
 def test_the_table_of_success_counts_maps_folds_and_angle_sums(disks, tmp_path, quick_drawing):
-    tables = find_paper("ceps2021").folder / "success.toml"
-    report = write_report(disks, tmp_path, "c", paper=find_paper("ceps2021"), tables=[tables])
+    report = write_report(disks, tmp_path, "c", paper=find_paper("ceps2021"))
     found = {table.name: table for table in items_of(report, Table)}["declared-1-success-of-disks"]
     rows = {row[0].text: [value.text for value in row] for row in found.rows}
     headings = [f"{c.group} {c.title}".strip() for c in found.columns]
