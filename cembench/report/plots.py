@@ -112,6 +112,8 @@ LARGE = 10_000_000
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Maximum number of ticks on an axis of integers.
 TICKS = 8
+#: Inches that a character of a legend's name takes, what is beside a name, and a line.
+NAME_INCHES, MARK_INCHES, LINE_INCHES = 0.065, 0.6, 0.175
 #: Reproducible output: fixed salt for identifiers, no date. Text in SVG stays text.
 _STYLE: Any = {
     "svg.hashsalt": "cembench",
@@ -186,7 +188,9 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
     with rc_context(_STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
         single = 1.35 if columns == 1 else 1.0
-        size = (columns * WIDTH * single, rows * (HEIGHT + tall) + 0.35)
+        width, names = columns * WIDTH * single, _names(plot)
+        lines = -(-len(names) // _legend_columns(names, width)) if names else 0
+        size = (width, rows * (HEIGHT + tall) + LINE_INCHES * max(lines, 2))
         canvas = Canvas(figsize=size, dpi=DPI, facecolor="white")
         FigureCanvasAgg(canvas)
         for k, panel in enumerate(plot.panels):
@@ -208,6 +212,12 @@ def _with_few_colours(png: bytes) -> bytes:
         few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
         few.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI))
     return buffer.getvalue()
+
+
+def _names(plot: Plot) -> list[str]:
+    """Return the names in a plot's legend."""
+    series = (one for panel in plot.panels for one in panel.series)
+    return list(dict.fromkeys(one.name for one in series if one.named))
 
 
 def _width_of_names(panel: PlotPanel) -> float:
@@ -287,15 +297,29 @@ def _draw_legend(canvas: Canvas) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries:
-        across = max(2, int(canvas.get_figwidth() / 1.35))
+        columns = _legend_columns(list(entries), canvas.get_figwidth())
         canvas.legend(
             list(entries.values()),
             list(entries),
             loc="outside lower center",
-            ncols=min(len(entries), across),
+            ncols=columns,
             frameon=False,
             fontsize=8.5,
         )
+
+
+def _legend_columns(names: Sequence[str], inches: float) -> int:
+    """Return the most columns in which a legend of these names is not wider than that.
+
+    >>> [_legend_columns(names, 6.0) for names in (["CEM", "LDM"], ["a name of twenty-one"] * 9)]
+    [2, 3]
+    """
+
+    def width(columns: int) -> float:
+        parts = np.array_split([len(name) for name in names], columns)
+        return sum(NAME_INCHES * int(part.max()) + MARK_INCHES for part in parts)
+
+    return next((n for n in range(len(names), 1, -1) if width(n) <= inches), 1)
 
 
 def plotly_of(plot: Plot) -> dict[str, Any]:
