@@ -18,8 +18,9 @@ import signal
 import sys
 import tempfile
 import traceback
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from functools import partial
 from typing import Any, NoReturn
 
 from typer.core import TyperGroup
@@ -31,6 +32,15 @@ from cembench.core.errors import CembenchError
 BAD_USAGE, FAULT, SYSTEM, CLOSED_PIPE = 2, 70, 74, 141
 #: Environment variable: if set, the traceback of an internal error goes to standard error.
 DEBUG = "CEMBENCH_DEBUG"
+#: What the help calls values of these types; a flag has none.
+VALUES = {
+    "<bool>": "",
+    "<path>": "PATH",
+    "<list[Path]>": "PATH...",
+    "<str>": "NAME",
+    "<list[str]>": "NAME...",
+    "<int range>": "N",
+}
 #: Message after Ctrl-C.
 STOPPED, STOPPED_AND_KEPT = "Stopped.", "Stopped; the same command resumes."
 
@@ -65,6 +75,14 @@ class Verbs(TyperGroup):
             command.short_help = (command.help or "").split("\n\n")[0]
         super().format_help(ctx, formatter)
 
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return a command whose help names values as users do, not as Python does."""
+        command = super().get_command(ctx, cmd_name)
+        for one in command.get_params(ctx) if command else ():
+            if shown := getattr(one, "display_type_rich", None):  # newer versions of the library
+                one.display_type_rich = partial(_named_value, shown)  # type: ignore[attr-defined]
+        return command
+
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Read a command line; without a word it asks for help."""
         return super().parse_args(ctx, args or ([] if ctx.resilient_parsing else ["--help"]))
@@ -78,6 +96,11 @@ class Verbs(TyperGroup):
             raise
         except (OSError, EOFError) as error:
             raise _Passed(error) from error
+
+
+def _named_value(shown: Callable[[Any], str | None], ctx: Any) -> str | None:
+    words = shown(ctx)
+    return VALUES.get(words or "", words)
 
 
 @contextmanager

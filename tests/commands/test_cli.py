@@ -1,5 +1,6 @@
 import json
 import os
+import re
 import subprocess
 import sys
 
@@ -242,6 +243,7 @@ def test_help_has_an_example(verb, cli):
     assert "Usage:" in out
     assert not verb or "Example" in out
     assert max(map(len, out.splitlines())) <= 80
+    assert not re.search(r"<(bool|str|path|list)\b", out), "a type of Python as the name of a value"
 
 
 def test_the_module_runs_as_a_process(tmp_path):
