@@ -216,7 +216,7 @@ def _flattened(
                 corners, broken = angles(_sides(T, v))
             return flat - angle_sums(half[T.F], corners, n), corners, broken
 
-    gradient, measured, broken = missing(u)
+    gradient, corners, broken = missing(u)
     best = float(np.abs(gradient / copies).max())
     factor: Cholesky | None = None
     ordered = flips = 0
@@ -225,7 +225,7 @@ def _flattened(
             return u[half], best, iteration
         if factor is None or best > KEPT or T.flips > flips:
             with phase("assembly"):
-                H = laplacian_of_weights(half[T.F], half_cotangents_of(measured, broken), n)
+                H = laplacian_of_weights(half[T.F], half_cotangents_of(corners, broken), n)
                 H = H[free][:, free]
             few = T.flips - ordered <= FEW * len(T.F)
             factor = Cholesky(H, like=factor if few else None)
@@ -239,7 +239,7 @@ def _flattened(
             if float(there @ step) <= -UPHILL * slope:
                 break
             share /= 2
-        u, gradient, measured, broken = u + share * step, there, now, lost
+        u, gradient, corners, broken = u + share * step, there, now, lost
         best = float(np.abs(gradient / copies).max())
     raise AlgorithmFailed(
         f"the angle sums are still off by up to {best:.2g} rad after {most} Newton steps, "

@@ -30,8 +30,11 @@ from cembench.report.plots import drawn
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.shared_drawing import shared_drawing
-from cembench.results.papers import MEASURED, Paper
+from cembench.results.papers import Paper
 from cembench.results.records import Record
+
+#: The file of a paper that declares tables and plots of what was measured, for its reports.
+MEASURED = "measured.toml"
 
 
 def write_report(

@@ -33,8 +33,6 @@ if TYPE_CHECKING:
 
 #: Group of the entry points of papers.
 GROUP = "cembench.papers"
-#: The file of a paper that declares tables and plots of what was measured, for its reports.
-MEASURED = "measured.toml"
 #: Files that a paper need not have.
 _OPTIONAL = ("runs.toml", "figures.toml", "claims.toml")
 #: Fields in which names in braces stand for words and numbers.
