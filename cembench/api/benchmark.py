@@ -409,6 +409,7 @@ def benchmark(
     """
     import tempfile
 
+    from cembench.api.paper_surfaces import is_kept, stand_ins
     from cembench.api.run_plan import (
         Plan,
         check_cluster,
@@ -467,7 +468,8 @@ def benchmark(
     for algorithm in chosen:
         if why := missing(algorithm):
             reporter.note(f"{algorithm.name} is not available: {why}.")
-    named += surfaces_of(models, registry) if models else []
+    of_profile = surfaces_of(models, registry) if models else []
+    named += of_profile
     if not named and not mesh_dir and not sets:
         raise ParameterError.about(
             "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
@@ -484,6 +486,9 @@ def benchmark(
             "{repair} works with single files and with {mesh_dir}: repair the files of a set one "
             "by one, or leave it out."
         )
+    new = [name for name in of_profile if not is_kept(registry.surface(name))]
+    if new and faces is None:
+        stand_ins(registry, new, usable_cores(), reporter)  # and kept, to be read with the others
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
             *(named, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair

@@ -1,4 +1,4 @@
-"""The surfaces of the paper that `reproduce` measures: public models, and stand-ins."""
+"""The surfaces of the paper: public models, and stand-ins."""
 
 from __future__ import annotations
 
@@ -8,8 +8,10 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from time import monotonic
 
+from cembench.api.settings import bytes_of
 from cembench.core.errors import CembenchError, RecordError
 from cembench.core.extras import MissingExtra
+from cembench.core.reporter import Reporter
 from cembench.mesh.datasets import Dataset, fetch_all, is_fetched
 from cembench.mesh.download import Progress
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -82,6 +84,17 @@ def _briefly(error: CembenchError) -> str:
     return str(error.__cause__) if beneath is None else type(beneath).__name__
 
 
+def stand_ins(
+    registry: Registry, names: Sequence[str], jobs: int, reporter: Reporter
+) -> list[TriangleMesh]:
+    """Return these surfaces, like :func:`make_stand_ins` in as many processes as memory allows."""
+    with reporter.busy("making stand-ins"):
+        return make_stand_ins(
+            *(registry, names, min(jobs, bytes_of(None) // STAND_IN_BYTES)),
+            lambda name, done, total: reporter.info(f"[{done}/{total}] made {name}"),
+        )
+
+
 def make_stand_ins(
     registry: Registry, names: Sequence[str], jobs: int, made: Callable[[str, int, int], None]
 ) -> list[TriangleMesh]:
@@ -90,7 +103,7 @@ def make_stand_ins(
     `made` receives the name of each that was made, how many
     were, and how many were not in the cache.
     """
-    new = [name for name in names if not _is_cached(registry.surface(name))]
+    new = [name for name in names if not is_kept(registry.surface(name))]
     stand_ins: dict[str, TriangleMesh] = {}
     if min(jobs, len(new)) > 1:
         # A process that breaks its memory limit ends them all: one at a time needs less.
@@ -114,5 +127,6 @@ def _make(name: str) -> TriangleMesh:
     return generate_surface(load_registry(), name)
 
 
-def _is_cached(surface: Surface) -> bool:
+def is_kept(surface: Surface) -> bool:
+    """Whether a surface was made before and is in the cache."""
     return surface.kept is not None and surface.kept(**surface.arguments({})).is_file()

@@ -142,32 +142,23 @@ def _surfaces(
     registry: Registry, algorithms: list[Algorithm], offline: bool, jobs: int, reporter: Reporter
 ) -> tuple[list[TriangleMesh], dict[str, Provenance]]:
     """Return a surface for each row: the model if it is there, else its stand-in; and the roles."""
-    from cembench.api.paper_surfaces import (
-        STAND_IN_BYTES,
-        fetch_models,
-        make_stand_ins,
-        public_models,
-    )
+    from cembench.api.paper_surfaces import fetch_models, public_models, stand_ins
     from cembench.api.run_plan import read_surfaces
     from cembench.mesh.datasets import is_fetched, surface_file
     from cembench.results.profiles import Profile, surfaces_of
     from cembench.running.plan import provenances
 
-    stand_ins = {registry.surface(s).paper_row: s for s in surfaces_of(Profile.quick, registry)}
-    public = public_models(registry, list(stand_ins))
+    standing = {registry.surface(s).paper_row: s for s in surfaces_of(Profile.quick, registry)}
+    public = public_models(registry, list(standing))
     if public and not offline:
         with reporter.downloads(public) as progress:
             what = fetch_models(public, progress)
         reporter.info(what)
     models = {one.paper_row: one for one in public if is_fetched(one)}
-    missing = {row: name for row, name in stand_ins.items() if row not in models}
+    missing = {row: name for row, name in standing.items() if row not in models}
     for kind, rows in (("the paper's models", models), ("stand-ins", missing)):
         reporter.info(f"{kind}: {', '.join(rows) or 'none'}")
-    with reporter.busy("making stand-ins"):
-        made = make_stand_ins(
-            *(registry, list(missing.values()), min(jobs, bytes_of(None) // STAND_IN_BYTES)),
-            lambda name, done, total: reporter.info(f"[{done}/{total}] made {name}"),
-        )
+    made = stand_ins(registry, list(missing.values()), jobs, reporter)
     files = map(surface_file, models.values())
     read, roles = read_surfaces(files, (), registry, algorithms, reporter, faces=None, repair=False)
     return [*read, *made], roles | provenances(registry, list(missing.values()))
