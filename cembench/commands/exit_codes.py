@@ -33,14 +33,8 @@ BAD_USAGE, FAULT, SYSTEM, CLOSED_PIPE = 2, 70, 74, 141
 #: Environment variable: if set, the traceback of an internal error goes to standard error.
 DEBUG = "CEMBENCH_DEBUG"
 #: What the help calls values of these types; a flag has none.
-VALUES = {
-    "<bool>": "",
-    "<path>": "PATH",
-    "<list[Path]>": "PATH...",
-    "<str>": "NAME",
-    "<list[str]>": "NAME...",
-    "<int range>": "N",
-}
+VALUES = {"<bool>": "", "<path>": "PATH", "<list[Path]>": "PATH...", "<int range>": "N"}
+VALUES |= {"<str>": "NAME", "<list[str]>": "NAME..."}
 #: Message after Ctrl-C.
 STOPPED, STOPPED_AND_KEPT = "Stopped.", "Stopped; the same command resumes."
 

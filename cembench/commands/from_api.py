@@ -101,14 +101,13 @@ def from_api(
                 names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
-        def command(**options: Any) -> None:
+        def command(**rest: Any) -> None:
             try:
                 taken = {
-                    name: _value(argument, options.pop(name))
-                    for name, argument in arguments.items()
+                    name: _value(argument, rest.pop(name)) for name, argument in arguments.items()
                 }
-                with hushed(options.pop("quiet")):
-                    body(partial(function, **taken), **options)
+                with hushed(rest.pop("quiet")):
+                    body(partial(function, **taken), **rest)
             except CembenchError as error:
                 error.reword(NAMES | names)
                 raise

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration
-from cembench.report.document import Column, Table, Tone, Value, count, missing, words
+from cembench.report.document import Column, Table, Tone, Value, entry, missing, words
 from cembench.results.columns import FrameColumn, worded
 from cembench.results.comparison import UNSTABLE_WIDTH
 from cembench.results.frame import evaluate
@@ -165,7 +165,7 @@ def _footer_rows(
         cells = (words("") if n is None else footer.entry(n, lacking) for n in figures)
         lines.append((words(footer.label), words(""), *cells))
         if footer is footers[0]:
-            counts += [words("") if n is None else count(len(n)) for n in figures]
+            counts += [words("") if n is None else entry(len(n), "d", "") for n in figures]
     return [*lines, tuple(counts)]
 
 

@@ -258,7 +258,7 @@ def _of_surfaces(
     frame: pd.DataFrame,
     surfaces: Sequence[MeasuredSurface],
     name: str,
-    texts_of_run: Mapping[str, str],
+    about: Mapping[str, str],
     notes: Sequence[str],
 ) -> Table:
     """Return a table of surfaces: columns by algorithm if each names it in its group."""
@@ -266,11 +266,7 @@ def _of_surfaces(
     series = [evidence.series[k] for k in sorted(frame["series"].unique())]
     policy, *several = frame["solves"].unique()
     policy = None if several else policy
-    known = {
-        **texts_of_run,
-        "surfaces": len(surfaces),
-        "here": POLICIES.get(policy or "", str(policy)),
-    }
+    known = {**about, "surfaces": len(surfaces), "here": POLICIES.get(policy or "", str(policy))}
     quantities = []
     for one in spec.columns:
         for s in series:

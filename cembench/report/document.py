@@ -394,11 +394,6 @@ def plain(sentence: Sentence) -> str:
     return "".join(part if isinstance(part, str) else part.title for part in sentence)
 
 
-def count(number: int) -> Value:
-    """Return an entry that says how many."""
-    return Value(str(number), number, "derived")
-
-
 def marked(value: Value, column: Column) -> str:
     """Return the text with the mark of its origin, unless the heading says "printed"."""
     mark = ORIGINS[value.origin][1] if value.origin else ""

@@ -336,10 +336,7 @@ def _cells(frame: pd.DataFrame) -> Table:
 
 
 def _shown(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:
-    def known(value: Any) -> bool:
-        return value is not None and not (isinstance(value, float) and value != value)
-
     return {
-        key: {name: row[name] for name in _SHOWN if name in row and known(row[name])}
+        key: {k: v for k in _SHOWN if (v := row.get(k)) is not None and v == v}  # NaN is no figure
         for key, row in rows.items()
     }

@@ -17,7 +17,7 @@ import numpy as np
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import BIN, Inspection, angles_of
-from cembench.report.document import Column, Table, Value, count, missing, words
+from cembench.report.document import Column, Table, Value, entry, missing, words
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.plots import PlotSeries, Point, through
 from cembench.results.papers import Paper
@@ -272,4 +272,4 @@ def _fit_cells(law: Fit | None) -> list[Value]:
     if law is None:
         return [missing(f"fewer than {FEWEST} sizes"), missing("no fit")]
     text = f"{law.exponent:.2f} ± {law.error:.2f}"
-    return [Value(text, law.exponent, "derived"), count(law.n)]
+    return [Value(text, law.exponent, "derived"), entry(law.n, "d", "")]

@@ -188,14 +188,17 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
     with rc_context(_STYLE), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing")  # a box is drawn instead
         single = 1.35 if columns == 1 else 1.0
-        width, names = columns * WIDTH * single, _names(plot)
-        lines = -(-len(names) // _legend_columns(names, width)) if names else 0
-        size = (width, rows * (HEIGHT + tall) + LINE_INCHES * max(lines, 2))
+        width = columns * WIDTH * single
+        series = (one for panel in plot.panels for one in panel.series)
+        names = list(dict.fromkeys(one.name for one in series if one.named))
+        across = _legend_columns(names, width)
+        legend = LINE_INCHES * max(-(-len(names) // across), 2)
+        size = (width, rows * (HEIGHT + tall) + legend)
         canvas = Canvas(figsize=size, dpi=DPI, facecolor="white")
         FigureCanvasAgg(canvas)
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
-        _draw_legend(canvas)
+        _draw_legend(canvas, across)
         ConstrainedLayoutEngine().execute(canvas)  # once: a canvas would repeat it in each format
         contents = {}
         for form in FORMS:
@@ -212,12 +215,6 @@ def _with_few_colours(png: bytes) -> bytes:
         few = picture.convert("RGB").quantize(96, dither=Image.Dither.NONE)
         few.save(buffer, "PNG", optimize=True, dpi=(DPI, DPI))
     return buffer.getvalue()
-
-
-def _names(plot: Plot) -> list[str]:
-    """Return the names in a plot's legend."""
-    series = (one for panel in plot.panels for one in panel.series)
-    return list(dict.fromkeys(one.name for one in series if one.named))
 
 
 def _width_of_names(panel: PlotPanel) -> float:
@@ -291,13 +288,12 @@ def _tick(value: float) -> str:
     return f"{value:,.0f}" if value >= 1 else f"{value:.8f}".rstrip("0")
 
 
-def _draw_legend(canvas: Canvas) -> None:
+def _draw_legend(canvas: Canvas, columns: int) -> None:
     entries: dict[str, Any] = {}
     for axes in canvas.axes:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries:
-        columns = _legend_columns(list(entries), canvas.get_figwidth())
         canvas.legend(
             list(entries.values()),
             list(entries),

@@ -109,7 +109,7 @@ def test_the_public_program_gives_the_printed_digits_of_nefertiti():
 
 
 def test_the_public_program_returns_the_last_iterate_and_turns_by_a_and_half_of_b():
-    mesh = hemi_ellipsoid(200, z=8.0)
+    mesh = hemi_ellipsoid(150, z=12.0)  # on others rounding decides
     assert fdm(mesh, public_program=True).extras["iterations_dropped"] == 0
     assert fdm(mesh).extras["iterations_dropped"] > 0
     p, q = np.exp(0.4j), np.exp(0.6j)

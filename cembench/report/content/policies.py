@@ -9,12 +9,7 @@ from cembench.report.document import Gap, Table
 from cembench.results.columns import counted
 from cembench.results.frame import filled
 
-REUSE, BACKSLASH = BOTH = tuple(POLICIES)
-
-
-def has_both_policies(evidence: Evidence) -> bool:
-    """Whether the run measured both policies."""
-    return all(policy in evidence.policies for policy in BOTH)
+BOTH = tuple(POLICIES)
 
 
 def one_policy_gap(evidence: Evidence) -> Gap:

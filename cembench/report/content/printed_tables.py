@@ -24,7 +24,7 @@ from cembench.report.by_surface import (
 )
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.policies import sure_speedups
-from cembench.report.document import Column, Table, count, entry, missing, words
+from cembench.report.document import Column, Table, entry, missing, words
 from cembench.results.columns import COLUMNS, FrameColumn, worded
 from cembench.results.papers import Paper
 
@@ -136,7 +136,7 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
             printed_rates(paper, a, list(measured)),
             [*measured.values()],
         )
-        counts += [words(""), *(count(len(rates)) for rates in sets[a])]
+        counts += [words(""), *(entry(len(rates), "d", "") for rates in sets[a])]
         work.append(work_ratios(evidence, a, policy))
     for k, reading in enumerate(READINGS):
         cells = [words(reading.label)]

@@ -333,7 +333,7 @@ def _beside(run: _Run) -> list[Item]:
 
 def _policies(run: _Run) -> list[Item]:
     """Return tables and a plot of both policies; empty if the run has one."""
-    if not policies.has_both_policies(run.evidence):
+    if not set(policies.BOTH) <= set(run.evidence.policies):
         return []
     tables = run.tables("reuse-against-backslash", "speedup-by-policy")
     return [*tables, *run.plots("reuse-against-backslash")]

@@ -102,9 +102,7 @@ def _with_origins(table: Table) -> Table:
     held = set().union(*numbers) - {"", "derived"}
     if len(held) < 2:
         return table
-    legend = [
-        f"{mark} {explained}" for o, (explained, mark) in ORIGINS.items() if o in held and mark
-    ]
+    legend = [f"{mark} {name}" for o, (name, mark) in ORIGINS.items() if o in held and mark]
     by_row = all(len(own - {"", "derived"}) < 2 for own in numbers)
     rows = tuple(
         (replace(row[0], text=row[0].text + "".join(ORIGINS[o][1] for o in own & held)), *row[1:])
