@@ -486,9 +486,10 @@ def benchmark(
             "{repair} works with single files and with {mesh_dir}: repair the files of a set one "
             "by one, or leave it out."
         )
-    new = [name for name in of_profile if not is_kept(registry.surface(name))]
+    kept = [name for name in of_profile if registry.surface(name).kept]
+    new = [name for name in kept if not is_kept(registry.surface(name))]
     if new and faces is None:
-        stand_ins(registry, new, usable_cores(), reporter)  # and kept, to be read with the others
+        stand_ins(registry, new, usable_cores(), reporter)  # to be read with the others
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
             *(named, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
