@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from functools import partial
 
 import numpy as np
 
@@ -11,8 +12,10 @@ from cembench.core.errors import ParameterError
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import FaultKind
 from cembench.validation import surfaces
-from cembench.validation.finding import ValidationFinding
+from cembench.validation.finding import ValidationFinding, finding
 from cembench.validation.solver import CheckedMap, Solver
+
+_finding = partial(finding, "contract")
 
 #: Allowed distance of the last entry of the energy history from the map's E_C, over its area.
 SAME_ENERGY = 1e-6
@@ -47,13 +50,10 @@ def parameters_fit(algorithm: Algorithm) -> ValidationFinding:
             json.dumps(parameter.default, allow_nan=False)
         except (ParameterError, TypeError, ValueError) as error:
             wrong.append(f"{parameter.name}={parameter.default!r}: {error}")
-    return ValidationFinding(
-        stage="contract",
-        name="parameters",
+    return _finding(
+        "parameters",
+        "; ".join(wrong) or f"{len(algorithm.parameters)} with type and default",
         ok=not wrong,
-        measured="; ".join(wrong) or f"{len(algorithm.parameters)} with type and default",
-        allowed="every default lies within its declared range and can be written as JSON",
-        remedy="correct the default or the range in the function's signature.",
     )
 
 
@@ -63,28 +63,13 @@ def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
     measured = f"complex128 ({mapped.mesh.n},), finite"
     if not mapped.is_usable:
         measured = f"{outcome.status} on {mapped.mesh.name}: {outcome.cause}"
-    return ValidationFinding(
-        stage="contract",
-        name="returns a map",
-        ok=mapped.is_usable,
-        measured=measured,
-        allowed="Parameterization(uv) with uv complex128 of shape (mesh.n,), finite",
-        remedy="return Parameterization(uv), uv[k] = u + i v of vertex k; raise AlgorithmFailed "
-        "where there is no map.",
-    )
+    return _finding("returns a map", measured, ok=mapped.is_usable)
 
 
 def leaves_mesh_unchanged(mapped: CheckedMap) -> ValidationFinding:
     """Check that the call left V and F unchanged."""
     changes = [f.detail for f in mapped.outcome.faults if f.kind is FaultKind.MESH_CHANGED]
-    return ValidationFinding(
-        stage="contract",
-        name="mesh untouched",
-        ok=not changes,
-        measured="; ".join(changes) or "V and F as before",
-        allowed="mesh.V and mesh.F have the same bits after the call",
-        remedy="work on copies: V = mesh.V.copy().",
-    )
+    return _finding("mesh untouched", "; ".join(changes) or "V and F as before", ok=not changes)
 
 
 def reports_its_energy(mapped: CheckedMap) -> ValidationFinding:
@@ -106,16 +91,7 @@ def reports_its_energy(mapped: CheckedMap) -> ValidationFinding:
         right = f"{iterations} iterations, no energies"
     elif other:
         right = f"{iterations} iterations; energies are of a different kind: {other}"
-    return ValidationFinding(
-        stage="contract",
-        name="energy history",
-        ok=not wrong,
-        measured=wrong or right,
-        allowed=f"empty, or E_C of the start and of each iteration, the last within "
-        f"{SAME_ENERGY:g} of the area",
-        remedy="report E_C (Eq. 7) of the map that is returned; leave the history empty for a "
-        'direct method, or say in extras["energy_of"] which other energy it is.',
-    )
+    return _finding("energy history", wrong or right, ok=not wrong, within=SAME_ENERGY)
 
 
 def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
@@ -124,13 +100,10 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
     apart = math.inf
     if first.uv is not None and second.uv is not None:
         apart = float(np.abs(first.uv - second.uv).max())
-    return ValidationFinding(
-        stage="contract",
-        name="repeatable",
+    return _finding(
+        "repeatable",
+        "the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
         ok=same,
-        measured="the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
-        allowed="the same mesh and parameters give the same bits, in every process",
-        remedy="give random numbers a seed (np.random.default_rng(0)); do not iterate over a set.",
     )
 
 
@@ -142,11 +115,4 @@ def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:
     right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"
     if without:
         right += f", gave up on {', '.join(without)} with a cause"
-    return ValidationFinding(
-        stage="contract",
-        name="awkward meshes",
-        ok=not bad,
-        measured="; ".join(causes) or right,
-        allowed="a finite map, or AlgorithmFailed with the cause, on any mesh of its type",
-        remedy="raise cembench.AlgorithmFailed if the method does not apply.",
-    )
+    return _finding("awkward meshes", "; ".join(causes) or right, ok=not bad)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -19,8 +20,10 @@ from cembench.registry import Algorithm, Registry
 from cembench.running.map_promises import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
-from cembench.validation.finding import ValidationFinding
+from cembench.validation.finding import ValidationFinding, finding
 from cembench.validation.solver import CheckedMap, Complex, Solver
+
+_finding = partial(finding, "correctness")
 
 #: Allowed relative change of figures, and of maps, if the same surface is given differently.
 SAME_FIGURES = 1e-6
@@ -87,26 +90,16 @@ def as_information(finding: ValidationFinding) -> ValidationFinding:
 def maps_known_surfaces(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Check that each closed-form surface is mapped."""
     bad = [f"{_named(m)}: {m.outcome.status}: {m.outcome.cause}" for m in maps if m.uv is None]
-    return ValidationFinding(
-        stage="correctness",
-        name="maps known surfaces",
-        ok=not bad,
-        measured="; ".join(bad) or f"all {len(maps)}",
-        allowed="a finite map of every closed-form surface",
-        remedy="run `cembench map` on that surface and follow the cause.",
-    )
+    return _finding("maps known surfaces", "; ".join(bad) or f"all {len(maps)}", ok=not bad)
 
 
 def keeps_orientation(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Check that triangles stay counter-clockwise in the plane."""
     mirrored = [_named(m) for m in maps if image_area(m.mesh, _uv(m)) <= 0]
-    return ValidationFinding(
-        stage="correctness",
-        name="orientation",
+    return _finding(
+        "orientation",
+        f"the map is mirrored on {', '.join(mirrored)}" if mirrored else "kept",
         ok=not mirrored,
-        measured=f"the map is mirrored on {', '.join(mirrored)}" if mirrored else "kept",
-        allowed="positive image area: counter-clockwise triangles stay counter-clockwise",
-        remedy="return np.conj(uv), or follow the boundary in the direction of mesh.boundary.",
     )
 
 
@@ -122,14 +115,12 @@ def boundary_findings(
     allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
     ok = off[worst] <= allowed
     where = "" if ok else f", on {_named(maps[worst])}"
-    yield ValidationFinding(
-        stage="correctness",
-        name="boundary",
+    yield _finding(
+        "boundary",
+        f"up to {off[worst]:.1e} off the circle{where}",
         ok=ok,
-        measured=f"up to {off[worst]:.1e} off the circle{where}",
-        allowed=f"|uv| = 1 on the outer boundary{'' if disk else ', holes on circles'}, "
-        f"within {allowed:g}",
-        remedy="divide the boundary's images by their moduli before the last solve.",
+        holes="" if disk else ", holes on circles",
+        within=allowed,
     )
 
 
@@ -137,16 +128,12 @@ def folds(maps: Sequence[CheckedMap]) -> ValidationFinding:
     """Check for folded triangles on surfaces that can be mapped without."""
     counts = [(flipped_triangles(m.mesh, _uv(m)), m) for m in maps]
     bad = [f"{count} of {m.mesh.m} triangles folded on {_named(m)}" for count, m in counts if count]
-    return ValidationFinding(
-        stage="correctness",
-        name="folds",
-        ok=not bad,
-        measured="; ".join(bad[:2]) + (f" and {len(bad) - 2} more" if len(bad) > 2 else "")
+    return _finding(
+        "folds",
+        "; ".join(bad[:2]) + (f" and {len(bad) - 2} more" if len(bad) > 2 else "")
         if bad
         else "none",
-        allowed="no triangle without positive area on a closed-form surface",
-        remedy="solve the interior harmonically for the final boundary; "
-        "cembench.conformal.folds.without_folds repairs what remains.",
+        ok=not bad,
     )
 
 
@@ -173,15 +160,11 @@ def _rate(
     rounding: float,
 ) -> ValidationFinding:
     shown = ", ".join(f"{error:.2g}" for error in errors)
-    return ValidationFinding(
-        stage="correctness",
-        name=f"{what} under refinement",
+    return _finding(
+        f"{what} under refinement",
+        f"on {series.surface.name} {shown}: order {order:.2f}",
         ok=order >= least or max(errors) <= rounding,
-        measured=f"on {series.surface.name} {shown}: order {order:.2f}",
-        allowed=f"it falls like h^{least:g} or faster, as that of a conformal map does "
-        f"(linear elements: {2 if what == 'E_C' else 1})",
-        remedy="the maps do not tend to a conformal one: look for noise, a tolerance that is too "
-        "coarse, or a boundary that is not the conformal one.",
+        least=least,
     )
 
 
@@ -191,15 +174,12 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
     if exact is None:
         raise ValueError(f"{series.surface.name} has no known closed-form map")
     errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
-    return ValidationFinding(
-        stage="correctness",
-        name="exact map",
-        ok=errors[-1] <= POSITION_ERROR,
-        measured=f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
+    return _finding(
+        "exact map",
+        f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
         f"{_order(series, errors):.2f}",
-        allowed=f"at most {POSITION_ERROR:g} of the radius on the finest triangulation, up to a "
-        "Moebius map",
-        remedy="the limit is not the conformal map of this surface: check the boundary's images.",
+        ok=errors[-1] <= POSITION_ERROR,
+        within=POSITION_ERROR,
     )
 
 
@@ -208,16 +188,13 @@ def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
     pairs = [(certify(_disk(m.mesh)), _uv(m)) for m in series.maps]
     off = [exact.off(uv[exact.corners]) for exact, uv in pairs]
     finest, uv = pairs[-1]
-    return ValidationFinding(
-        stage="correctness",
-        name="modulus",
-        ok=finest.encloses(uv[finest.corners]),
-        measured=f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
+    return _finding(
+        "modulus",
+        f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
         f"reciprocal error {', '.join(f'{c.reciprocal_error:.1e}' for c, _ in pairs)}",
-        allowed="on the finest triangulation between the two bounds of the surface's own modulus: "
-        f"{finest.lower:.4f} to {finest.upper:.4f}",
-        remedy="a conformal map keeps the cross ratio of four boundary points: check where the "
-        "boundary goes on the circle.",
+        ok=finest.encloses(uv[finest.corners]),
+        lower=finest.lower,
+        upper=finest.upper,
     )
 
 
@@ -237,17 +214,9 @@ def _invariances(solver: Solver, uneven: CheckedMap) -> Iterator[ValidationFindi
         again,
         None if again.uv is None else again.uv[number],
         moebius=not similarity,
-        remedy="do not let anything depend on a vertex's number: choose start points by geometry.",
     )
     moved = solver.map(surfaces.moved(uneven.mesh))
-    yield same_map(
-        "rotation, shift, scale",
-        uneven,
-        moved,
-        moved.uv,
-        moebius=not similarity,
-        remedy="use lengths and angles of the surface, not its coordinates; scale tolerances.",
-    )
+    yield same_map("rotation, shift, scale", uneven, moved, moved.uv, moebius=not similarity)
     yield same_under_backslash(uneven, solver.map(uneven.mesh, solves="backslash"))
 
 
@@ -258,7 +227,6 @@ def same_map(
     uv: Complex | None,
     *,
     moebius: bool,
-    remedy: str,
 ) -> ValidationFinding:
     """Check that the map or its figures are the same if the surface is given differently.
 
@@ -271,14 +239,7 @@ def same_map(
         apart = distance(uv, _uv(first), moebius=moebius)
         ok = min(figures, apart) <= SAME_FIGURES
         measured = f"figures differ by {figures:.1e}, maps by {apart:.1e}"
-    return ValidationFinding(
-        stage="correctness",
-        name=what,
-        ok=ok,
-        measured=measured,
-        allowed=f"the same figures or the same map, up to a Moebius map, within {SAME_FIGURES:g}",
-        remedy=remedy,
-    )
+    return _finding(what, measured, ok=ok, within=SAME_FIGURES)
 
 
 def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFinding:
@@ -289,15 +250,7 @@ def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFind
     measured = f"reuse and backslash differ by up to {apart:.1e}"
     if anew.uv is None:
         measured = f"{anew.outcome.status}: {anew.outcome.cause}"
-    return ValidationFinding(
-        stage="correctness",
-        name="both linear-algebra policies",
-        ok=apart <= SAME_MAP,
-        measured=measured,
-        allowed=f"the same map within {SAME_MAP:g} however systems are solved",
-        remedy="factor and solve only through cembench.linear_algebra.cholesky.Cholesky, and call "
-        "update() when the matrix changes.",
-    )
+    return _finding("both linear-algebra policies", measured, ok=apart <= SAME_MAP, within=SAME_MAP)
 
 
 def _largest_difference(first: CheckedMap, second: CheckedMap) -> float:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+import tomllib
+from functools import cache
+from importlib.resources import files
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict
 
@@ -25,3 +28,19 @@ class ValidationFinding(BaseModel):
     measured: str
     allowed: str
     remedy: str
+
+
+def finding(
+    stage: Stage, name: str, measured: str, *, ok: bool, undecided: bool = False, **known: Any
+) -> ValidationFinding:
+    """Return the finding of a check of `findings.toml`; `known` stand in its text in braces."""
+    said = {key: text.format_map(known) for key, text in _declared()[stage][name].items()}
+    return ValidationFinding(
+        stage=stage, name=name, ok=ok, undecided=undecided, measured=measured, **said
+    )
+
+
+@cache
+def _declared() -> dict[str, dict[str, dict[str, str]]]:
+    file = files("cembench.validation") / "findings.toml"
+    return tomllib.loads(file.read_text(encoding="utf-8"))

@@ -32,7 +32,7 @@ from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record
-from cembench.validation.finding import ValidationFinding
+from cembench.validation.finding import ValidationFinding, finding
 
 #: Ratios this close to 1 are ties.
 TIE = 0.01
@@ -257,27 +257,22 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
         r.cell.mesh for r in records if of_kind(NoticeKind.NOT_DETERMINISTIC, r.outcome.notes)
     ]
     return [
-        ValidationFinding(
-            stage="quality",
-            name="every surface",
-            ok=not bad and not none,
-            measured="; ".join(bad)
+        finding(
+            "quality",
+            "every surface",
+            "; ".join(bad)
             or (
                 f"no map on any of {len(records)} surfaces" if none else "a map or a cause on each"
             ),
-            allowed="a map with its boundary and orientation right, or AlgorithmFailed with a "
-            "cause; folds are counted",
-            remedy="run `cembench map` on that surface and follow the cause.",
+            ok=not bad and not none,
         ),
-        ValidationFinding(
-            stage="quality",
-            name="repeatable in every round",
-            ok=not changing,
-            measured=f"different bits in a later call on {', '.join(changing)}"
+        finding(
+            "quality",
+            "repeatable in every round",
+            f"different bits in a later call on {', '.join(changing)}"
             if changing
             else "the same bits in every round",
-            allowed="the same bits in every process, and in the second call of a process",
-            remedy="do not keep state from one call to the next.",
+            ok=not changing,
         ),
     ]
 

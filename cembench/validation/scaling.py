@@ -24,7 +24,7 @@ from cembench.results.intervals import ERROR, LOOKS, Interval, next_look, share
 from cembench.results.rank_tests import centre_interval
 from cembench.results.records import Record, Round, lower_median
 from cembench.running.schedule import cost
-from cembench.validation.finding import ValidationFinding
+from cembench.validation.finding import ValidationFinding, finding
 
 #: Largest allowed exponent. Factoring the Laplacian of a planar mesh costs faces^1.5
 #: in theory; 0.25 allows for iteration counts that grow with the mesh.
@@ -197,16 +197,14 @@ def scales(growth: GrowthComparison | None) -> ValidationFinding:
     measured = "it could not be timed on two sizes"
     if growth is not None:
         measured = _words(growth)
-    return ValidationFinding(
-        stage="scaling",
-        name="growth of the seconds",
+    return finding(
+        "scaling",
+        "growth of the seconds",
+        measured,
         ok=growth is not None and growth.answer is not GrowthAnswer.too_steep,
         undecided=growth is not None and growth.answer is GrowthAnswer.inconclusive,
-        measured=measured,
-        allowed=f"an exponent of {MOST_EXPONENT:g} at most, or {MOST_ABOVE_REFERENCE:g} more than "
-        "the reference's in the same rounds; factoring a planar Laplacian has 1.5",
-        remedy="look for a loop over vertices within a loop over vertices, for dense matrices, "
-        "and for iterations whose number grows with the mesh.",
+        most=MOST_EXPONENT,
+        above=MOST_ABOVE_REFERENCE,
     )
 
 
