@@ -8,7 +8,6 @@ Power laws, a front, and performance profiles are drawn besides the points.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from math import inf
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -20,7 +19,9 @@ from cembench.report.content.inspection import BIN, Inspection, angles_of
 from cembench.report.document import Column, Table, Value, entry, missing, words
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.plots import PlotSeries, Point, through
+from cembench.results.multiple_testing import geometric
 from cembench.results.papers import Paper
+from cembench.results.power_law import FEWEST, fit
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -139,53 +140,23 @@ ROWS: Mapping[str, Callable[[Evidence, pd.DataFrame, Inspections], pd.DataFrame]
 }
 
 
-#: Minimum number of points for a meaningful exponent.
-FEWEST = 3
-
-
-@dataclass(frozen=True)
-class Fit:
-    """y = factor * x ** exponent, fitted to logarithms; `error` is the standard error."""
-
-    exponent: float
-    factor: float
-    error: float
-    n: int
-
-
-def fit(points: Sequence[Point]) -> Fit | None:
-    """Return the power law fitted to points; None for too few of them or too few different x."""
-    if len(points) < FEWEST or len({p.x for p in points}) < FEWEST:
-        return None
-    x, y = (np.log([p[k] for p in points]) for k in (0, 1))
-    spread = float(((x - x.mean()) ** 2).sum())
-    exponent = float(((x - x.mean()) * (y - y.mean())).sum()) / spread
-    rest = y - y.mean() - exponent * (x - x.mean())
-    error = float(np.sqrt((rest**2).sum() / (len(x) - 2) / spread))
-    return Fit(exponent, float(np.exp(y.mean() - exponent * x.mean())), error, len(x))
-
-
 def power_law(label: str, points: Sequence[Point], style: SeriesStyle) -> PlotSeries | None:
     """Return the line of a power law through points; None if there is none to fit."""
-    law = fit(points)
+    law = fit([point[:2] for point in points])
     if law is None:
         return None
     ends = [min(p.x for p in points), max(p.x for p in points)]
-    line = [law.factor * e**law.exponent for e in ends]
+    line = list(map(law.at, ends))
     tooltips = [f"{label}: exponent {law.exponent:.2f}"] * 2
     return PlotSeries(f"{label}, fitted", ends, line, "line", style, tooltips, named=False)
 
 
 def front(clouds: Mapping[str, Sequence[Point]]) -> PlotSeries:
     """Return the geometric means of clouds of points that none of the others beats in x and y."""
-
-    def middle(values: Sequence[float]) -> float:
-        return float(np.exp(np.mean(np.log(values))))
-
-    means = [
-        Point(middle([p.x for p in cloud]), middle([p.y for p in cloud]), label)
-        for label, cloud in clouds.items()
-    ]
+    means = []
+    for label, cloud in clouds.items():
+        x, y = geometric(np.array([point[:2] for point in cloud]).T)
+        means.append(Point(float(x), float(y), label))
 
     def beats(one: Point, other: Point) -> bool:
         return one.x <= other.x and one.y <= other.y and one[:2] != other[:2]
@@ -246,11 +217,11 @@ def exponents_table(evidence: Evidence) -> Table:
     rows = []
     there, measured = printed(evidence), evidence.frame
     for series in evidence.disk_series:
-        of_paper = fit(_points(there[there["algorithm"] == series.algorithm]))
+        of_paper = there[there["algorithm"] == series.algorithm]
         cells = [words(series.label), *_fit_cells(of_paper)]
         own = measured[measured["ok"] & (measured["label"] == series.label)]
         for policy in evidence.policies:
-            cells += _fit_cells(fit(_points(own[own["solves"] == policy])))
+            cells += _fit_cells(own[own["solves"] == policy])
         rows.append(tuple(cells))
     return Table(
         "exponents",
@@ -263,12 +234,8 @@ def exponents_table(evidence: Evidence) -> Table:
     )
 
 
-def _points(frame: pd.DataFrame) -> list[Point]:
-    known = frame[frame["seconds"] > 0]
-    return [Point(*pair) for pair in zip(known["faces"], known["seconds"], strict=True)]
-
-
-def _fit_cells(law: Fit | None) -> list[Value]:
+def _fit_cells(timed: pd.DataFrame) -> list[Value]:
+    law = fit(timed[timed["seconds"] > 0][["faces", "seconds"]].to_numpy(float).tolist())
     if law is None:
         return [missing(f"fewer than {FEWEST} sizes"), missing("no fit")]
     text = f"{law.exponent:.2f} ± {law.error:.2f}"

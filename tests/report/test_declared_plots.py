@@ -18,7 +18,7 @@ from cembench.report.declared_plots import (
     own_plots,
 )
 from cembench.report.document import Text
-from cembench.report.plot_rows import cost_ratios, fit, front
+from cembench.report.plot_rows import cost_ratios, front
 from cembench.report.plots import Point, data_of
 from cembench.report.write_report import write_report
 
@@ -184,12 +184,3 @@ def test_every_plot_of_a_report_is_declared_and_can_be_made(evidence):
         plot = declared_plot(evidence, name, surface=surface)
         assert plot is not None, name
         assert all(series.x for panel in plot.panels for series in panel.series)
-
-
-def test_a_fitted_exponent_is_that_of_a_power_law():
-    points = [Point(n, 1e-6 * n**1.25) for n in (100, 1_000, 50_000, 10**6)]
-    law = fit(points)
-    assert law.exponent == pytest.approx(1.25)
-    assert law.error == pytest.approx(0, abs=1e-6)
-    assert fit(points[:2]) is None
-    assert fit([points[0]] * 5) is None
