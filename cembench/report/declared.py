@@ -319,7 +319,7 @@ def _columns(
         )
         title = filled(spec.heading, known) or spec.rows
         first = [(Column(title, numeric=False), [words(str(label)) for label, _ in groups])]
-        made = [[_aggregate(one, group) for _, group in groups] for one in spec.columns]
+        made = [[aggregate(one, group) for _, group in groups] for one in spec.columns]
     return first + [
         (replace(one.heading, title=filled(one.heading.title, known)), values)
         for one, values in zip(spec.columns, made, strict=True)
@@ -340,7 +340,8 @@ def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> V
     return figure_entry(evidence, record, COLUMNS[name])
 
 
-def _aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
+def aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
+    """Return the value of a column over a group of rows."""
     value = evaluate(one.value, group)
     if one.words:
         return words("-" if value is None else str(value))

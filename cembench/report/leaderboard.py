@@ -7,13 +7,15 @@ all runs stand together; seconds are only ever divided by seconds of the same ma
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, DISK, Evidence
+from cembench.report.declarations import filled, own, parsed
+from cembench.report.declared import DeclaredTable, aggregate
 from cembench.report.document import (
     Column,
     Gap,
@@ -35,9 +37,6 @@ if TYPE_CHECKING:
 
 #: Degrees below which angle errors count as equal: nobody sees them.
 _UNSEEN = 0.01
-#: Within this factor of the least, a figure is the best, too.
-_TIE = 1.01
-
 
 #: What an opened record shows.
 _SHOWN = (
@@ -123,56 +122,6 @@ def family(name: str, mesh_hash: str, origin: str, registry: Registry) -> str:
     return "generated" if made else "other"
 
 
-#: Which row of those in order stands for all: the middle, or the lower of two; the last.
-_RANKS: dict[str, Callable[[pd.DataFrame], pd.Series]] = {
-    "median": lambda ordered: ordered.iloc[(len(ordered) - 1) // 2],
-    "worst": lambda ordered: ordered.iloc[-1],
-}
-
-
-@dataclass(frozen=True)
-class _Count:
-    """How many rows there are, or values of a column; `ties` counts those as good as the best.
-
-    It opens the row that is nearest to the best.
-    """
-
-    title: str
-    distinct: str = "record"
-    ties: bool = False
-
-    @property
-    def column(self) -> Column:
-        return Column(self.title)
-
-    def of(self, ordered: pd.DataFrame) -> Value:
-        counted = ordered[ordered["ratio"] <= _TIE] if self.ties else ordered
-        number = counted[self.distinct].nunique()
-        return Value(f"{number:,d}", number, "surface", str(ordered["record"].iloc[0]))
-
-
-@dataclass(frozen=True)
-class _Rank:
-    """The median of a figure, or its worst, which opens its record."""
-
-    title: str
-    group: str
-    figure: str
-
-    @property
-    def column(self) -> Column:
-        return Column(self.title, self.group)
-
-    def of(self, rows: pd.DataFrame) -> Value:
-        row = _RANKS[self.title](rows.sort_values([self.figure, "record"]))
-        number = float(row[self.figure])
-        return Value(significant(number), number, "surface", str(row["record"]))
-
-
-def _groups(frame: pd.DataFrame) -> Iterable[tuple[Any, pd.DataFrame]]:
-    return frame.groupby("label", sort=True)
-
-
 def _angles(valid: pd.DataFrame, target: str) -> Item:
     """Compare angle errors with the least on each surface, over all machines."""
     known = valid[valid[ANGLE].notna()]
@@ -183,16 +132,7 @@ def _angles(valid: pd.DataFrame, target: str) -> Item:
     once = known.sort_values([ANGLE, "record"]).drop_duplicates(["label", "mesh_hash"])
     least = once.groupby("mesh_hash")[ANGLE].transform("min")
     once = once.assign(ratio=once[ANGLE].clip(lower=_UNSEEN) / least.clip(lower=_UNSEEN))
-    figures: tuple[_Count | _Rank, ...] = (
-        *(_Count("surfaces"), _Count("best on", ties=True)),
-        *(_Rank(t, "over the least on the surface", "ratio") for t in _RANKS),
-        *(_Rank(t, "degrees", ANGLE) for t in _RANKS),
-    )
-    caption = (
-        f"Over {once['mesh_hash'].nunique()} surfaces; an algorithm is compared on those that it "
-        "maps. Best: within 1 % of the least angle error. Errors below 0.01 degrees count as that."
-    )
-    return _compared(f"angles-{slug(target)}", title, once, figures, caption)
+    return _compared("angles", f"angles-{slug(target)}", title, once)
 
 
 def _seconds(valid: pd.DataFrame) -> Item:
@@ -204,33 +144,22 @@ def _seconds(valid: pd.DataFrame) -> Item:
     if known.empty:
         return Gap(title, "no run has two algorithms with equally good maps of a surface")
     least = known.groupby(place)["seconds"].transform("min")
-    figures: tuple[_Count | _Rank, ...] = (
-        *(_Count("surfaces", "mesh_hash"), _Count("machines", "machine"), _Count("cells")),
-        _Count("fastest", ties=True),
-        *(_Rank(t, "seconds over the fastest", "ratio") for t in _RANKS),
-    )
-    return _compared(
-        "seconds-at-equal-angles",
-        title,
-        known.assign(ratio=known["seconds"] / least),
-        figures,
-        "Maps to the disk whose mean angle error is at most 1.25 times the least on the surface, "
-        "or 0.25 degrees larger: their seconds over those of the fastest of them, in the same run "
-        "on the same machine.",
-    )
+    known = known.assign(ratio=known["seconds"] / least)
+    return _compared("seconds", "seconds-at-equal-angles", title, known)
 
 
-def _compared(
-    key: str, title: str, rows: pd.DataFrame, figures: Sequence[_Count | _Rank], caption: str
-) -> Table:
-    """Return a table of algorithms, the least median ratio to the best first."""
-    groups = [(str(label), own.sort_values(["ratio", "record"])) for label, own in _groups(rows)]
-    groups.sort(key=lambda one: (_RANKS["median"](one[1])["ratio"], one[0]))
-    columns = [Column("algorithm", numeric=False), *(figure.column for figure in figures)]
+def _compared(declared: str, name: str, title: str, rows: pd.DataFrame) -> Table:
+    """Return a declared table of algorithms, the least median ratio to the best first."""
+    spec = parsed(own("leaderboard.toml"), DeclaredTable, "leaderboard.toml")[declared]
+    groups = rows.sort_values(["ratio", "record"]).groupby("label")
+    order = groups["ratio"].median().sort_values(kind="stable").index
+    columns = [Column("algorithm", numeric=False), *(one.heading for one in spec.columns)]
     cells: list[list[Plain]] = [
-        [label, *(figure.of(own) for figure in figures)] for label, own in groups
+        [str(label), *(aggregate(one, groups.get_group(label)) for one in spec.columns)]
+        for label in order
     ]
-    return Table.of(key, title, columns, cells, caption=caption)
+    caption = filled(spec.caption, {"surfaces": rows["mesh_hash"].nunique()})
+    return Table.of(name, title, columns, cells, caption=caption)
 
 
 def _success(frame: pd.DataFrame) -> Table:
@@ -238,10 +167,10 @@ def _success(frame: pd.DataFrame) -> Table:
     tried = frame[frame["main"] & (frame["status"] != "skipped")]
     families = sorted(tried["family"].unique())
     rows: list[list[Plain]] = []
-    for label, own in _groups(tried):
+    for label, group in tried.groupby("label"):
         cells: list[Plain] = [str(label)]
         for chosen in [*families, None]:
-            some = own if chosen is None else own[own["family"] == chosen]
+            some = group if chosen is None else group[group["family"] == chosen]
             if some.empty:
                 cells.append(missing("it was not tried on this family"))
                 continue

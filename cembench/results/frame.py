@@ -73,6 +73,12 @@ def _at_largest(of: pd.Series, wanted: pd.Series) -> Any:
     return wanted.loc[of.astype(float).idxmax()] if of.notna().any() else None
 
 
+def _at_median(of: pd.Series, wanted: pd.Series) -> Any:
+    """Return the entry at the median of figures, the lower of two."""
+    ordered = of.dropna().astype(float).sort_values(kind="stable")
+    return wanted.loc[ordered.index[(len(ordered) - 1) // 2]] if len(ordered) else None
+
+
 def commonest(of: pd.Series) -> str:
     """Return the commonest entries of lists with their numbers: "folded 2, timeout 1"."""
     counts = Counter(kind for kinds in of for kind in kinds)
@@ -142,6 +148,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "geometric": _figure(geometric),
         "geometric_rate": _figure(lambda rates: geometric(1 + rates) - 1),
         "at_largest": _at_largest,
+        "at_median": _at_median,
         "first": lambda of: of.iloc[0] if len(of) else None,
         "commonest": commonest,
         "total": lambda of: of.sum(),
