@@ -185,14 +185,23 @@ def _numbers(
 
 def _places(columns: Sequence[Column], rows: Sequence[Sequence[Value]]) -> dict[str, str]:
     """Return the places of each cause of a gap, misprint or unstable time, as text."""
-    surfaces: dict[str, list[str]] = {}
+    causes: dict[str, dict[str, dict[str, None]]] = {}
     for row in rows:
         for column, value in zip(columns, row, strict=True):
             if value.why:
-                paired = column.title in ("printed", "here")
-                where = f"{row[0].text} / {column.group if paired else column.title}"
-                surfaces.setdefault(value.why, []).append(where)
-    return {why: f"{why} ({'; '.join(dict.fromkeys(places))})" for why, places in surfaces.items()}
+                name = column.group if column.title in ("printed", "here") else column.title
+                causes.setdefault(value.why, {}).setdefault(name, {})[row[0].text] = None
+    every = len({row[0].text for row in rows})
+    return {
+        why: f"{why} ({'; '.join(_place(name, list(of), every) for name, of in places.items())})"
+        for why, places in causes.items()
+    }
+
+
+def _place(name: str, surfaces: Sequence[str], every: int) -> str:
+    """Return "FDM: Foot, Left Hand" or, of a table with many surfaces, "FDM: all"."""
+    all_of_many = len(surfaces) == every > 2
+    return f"{name}: {'all' if all_of_many else ', '.join(surfaces)}"
 
 
 def _sizes(paper: Paper, surfaces: Sequence[MeasuredSurface]) -> list[str]:

@@ -226,6 +226,10 @@ class Claim:
         Result of the test, with n.
     remark : str
         Remarks on the verdict, such as the surfaces it was tested on.
+    plain : str
+        What it says in a few words.
+    counted : str
+        How many tests hold; of tests on surfaces, with the 95 % interval of the share of families.
 
     """
 
@@ -236,6 +240,8 @@ class Claim:
     figures: str
     verdict: Verdict
     remark: str = ""
+    plain: str = ""
+    counted: str = ""
 
     @property
     def title(self) -> str:

@@ -171,6 +171,8 @@ class StatedClaim(_Part):
     ----------
     name, quote, place, test, remark : str
         Its name, the paper's words, their place, the test in words, and what is to be said of it.
+    plain : str
+        What it says in a few plain words, for the list of all claims (default: the quote).
     rows : str
         Which rows of the frame it is about.
     algorithms : tuple of str
@@ -197,6 +199,7 @@ class StatedClaim(_Part):
     quote: str
     place: str
     test: str
+    plain: str = ""
     rows: str = "ok & main & chosen & model.notna()"
     algorithms: tuple[str, ...] = ()
     per: tuple[str, ...] = ("place", "surface")

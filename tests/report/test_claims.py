@@ -9,7 +9,7 @@ from cembench.surfaces.spherical_cap import spherical_cap
 from cembench.conformal.metrics import all_metrics, dilatations
 from cembench.core.errors import ParameterError
 from cembench.registry import load_registry
-from cembench.report.content.claims import claims, verdict_of
+from cembench.report.content.claims import at_a_glance, claims, counted, verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
 from cembench.results.records import Cell, Outcome, Record, Round
@@ -59,6 +59,31 @@ def test_every_claim_has_a_verdict_of_its_own_figures(found, evidence):
     assert found["inversion"].verdict == "not tested here"
     assert found["no-folding"].verdict == "holds"
     assert found["circular-holes"].verdict == "not tested here"
+
+
+def test_the_claims_at_a_glance_are_in_plain_words_failing_ones_first(found, evidence):
+    table = at_a_glance(list(found.values()))
+    by_words = {row[0].text: row for row in table.rows}
+    assert set(by_words) == {claim.plain for claim in evidence.paper.claims}
+    assert all(claim.plain for claim in evidence.paper.claims)
+    faster = by_words["CEM is faster than QIEM, FDM and LDM on every model."]
+    assert [entry.text for entry in faster[1:3]] == ["holds in part", "6 of 10"]
+    assert by_words["Holes become circles."][2].text == "-"
+    verdicts = [row[1].text for row in table.rows]
+    assert verdicts.index("holds in part") < verdicts.index("holds")
+    assert verdicts.index("holds") < verdicts.index("not tested here")
+
+
+def test_the_share_of_a_claim_has_an_interval_over_families():
+    def case(family, holds, of=1):
+        return {"family": family, "holds": holds, "of": of}
+
+    faces = [case("face", True)] * 100
+    assert counted(faces) == "100 of 100"  # one family shows nothing about others
+    others = [case(f"statue-{k}", k > 0) for k in range(9)]
+    # Nine of ten families, Wilson: 0.596 to 0.982.
+    assert counted([*faces, *others]) == "108 of 109 (60 to 98 % of families)"
+    assert counted([case(None, 3, 20), case(None, 20, 20), case(None, 0, 0)]) == "23 of 40"
 
 
 def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):

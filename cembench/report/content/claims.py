@@ -14,7 +14,8 @@ from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
-from cembench.report.document import Claim, Verdict
+from cembench.report.document import VERDICTS, Claim, Column, Table, Verdict
+from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
 from cembench.results.frame import evaluate, filled
 from cembench.results.papers import StatedClaim
 from cembench.results.records import MeshOrigin
@@ -115,6 +116,7 @@ def _tested(
         if case is not None:
             cases.append(case)
             places |= set(group["place"]) if case["of"] else set()
+            case["family"] = group["family"].iloc[0] if "place" in claim.per else None
     names = (*claim.per, *claim.each, "of", "lacking", "holds")
     columns = {name: pd.Series([case[name] for case in cases]) for name in names}
     held, tested, lacking = (int(columns[name].sum()) for name in ("holds", "of", "lacking"))
@@ -125,7 +127,43 @@ def _tested(
     figures = filled(claim.none if claim.none and not cases else claim.figures, frame, values)
     remark = " ".join(filter(None, (where, claim.remark, filled(claim.further, frame, values))))
     verdict = verdict_of(held, tested, lacking)
-    return Claim(claim.name, claim.quote, claim.place, claim.test, figures, verdict, remark)
+    return Claim(
+        *(claim.name, claim.quote, claim.place, claim.test, figures, verdict, remark),
+        plain=claim.plain or claim.quote,
+        counted=counted(cases) if tested else "",
+    )
+
+
+def counted(cases: Sequence[Mapping[str, Any]]) -> str:
+    """Return how many tests hold; with enough families, the interval of their share."""
+    tested = [case for case in cases if case["of"]]
+    held, of = (int(sum(case[name] for case in tested)) for name in ("holds", "of"))
+    shares = [case["holds"] / case["of"] for case in tested]
+    families = [case["family"] for case in tested]
+    own = family_means(shares, families)
+    if None in families or len(own) < FEWEST_FAMILIES:
+        return f"{held} of {of}"
+    between = share_interval(sum(own) / len(own), len(own))
+    return f"{held} of {of} ({100 * between.low:.0f} to {100 * between.high:.0f} % of families)"
+
+
+def at_a_glance(tested: Sequence[Claim]) -> Table:
+    """Return all claims in a line each, failing ones first."""
+    order = list(VERDICTS)
+    rows = [
+        (claim.plain, claim.verdict, claim.counted or None, claim.place)
+        for claim in sorted(tested, key=lambda claim: order.index(claim.verdict))
+    ]
+    lacking = "nothing to test it on, or too few rounds"
+    titles = ("claim", "verdict", "holds in", "place")
+    columns = [Column(title, numeric=False, lacking=lacking) for title in titles]
+    caption = (
+        "How many tests hold. In brackets is the 95 % interval of the share of families of "
+        f"surfaces on which it holds, where there are at least {FEWEST_FAMILIES}."
+    )
+    return Table.of(
+        "claims-at-a-glance", "The claims at a glance", columns, rows, origin="", caption=caption
+    )
 
 
 def _case(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
-from cembench.report.content.claims import claims
+from cembench.report.content.claims import at_a_glance, claims
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.findings import findings, many_findings, surfaces_words
@@ -321,6 +321,12 @@ def _tables(run: _Run) -> Section | None:
     return Section("tables", title, tuple(items)) if items else None
 
 
+def _claims(run: _Run) -> Section:
+    tested = claims(run.evidence, run.seen)
+    glance = [at_a_glance(tested)] if tested else []
+    return Section("claims", "Claims of the paper", (*glance, *tested))
+
+
 #: Plots of time, and tables of what does not compare with the rest.
 _TIMES = ("performance-profile", "accuracy-against-time", "time-by-phase")
 
@@ -385,7 +391,7 @@ _OF_A_PAPER: tuple[_Maker, ...] = (
     _paper_summary,
     lambda run: machines_section(run.evidence),
     _tables,
-    lambda run: Section("claims", "Claims of the paper", tuple(claims(run.evidence, run.seen))),
+    _claims,
     lambda run: figures_section(run.evidence, run.seen, run.folder),
     _beyond_the_paper,
 )
