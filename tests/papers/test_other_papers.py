@@ -207,7 +207,7 @@ def test_the_table_of_success_counts_maps_folds_and_angle_sums(disks, tmp_path, 
     found = {table.name: table for table in items_of(report, Table)}["declared-1-success-of-disks"]
     rows = {row[0].text: [value.text for value in row] for row in found.rows}
     headings = [f"{c.group} {c.title}".strip() for c in found.columns]
-    flips = dict(zip(headings, rows["CETM, flips"], strict=True))
+    flips = dict(zip(headings, rows["CETM (flips)"], strict=True))
     assert (flips["disks"], flips["valid"], flips["share"]) == ("2", "2", "100.0")
     assert float(flips["error of angle sums largest"]) < 1e-8
     assert flips["seconds median"] == "8"

@@ -327,6 +327,8 @@ class Evidence:
                 title, target = about[name].title, about[name].target
                 if titles[title] > 1:
                     title = f"{title} ({name})"
+                if ", " in title:  # names stand in lists: "CETM (flips)" is one, "CETM, flips" two
+                    title = f"{title.replace(', ', ' (', 1)})"
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
                 series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(series)
