@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 4_760,
     "running": 7_270,
     "drawing": 1_500,
-    "report": 7_460,
+    "report": 7_470,
     "validation": 2_270,
     "morphing": 1_350,
     "api": 5_050,

@@ -199,7 +199,7 @@ def _places(columns: Sequence[Column], rows: Sequence[Sequence[Value]]) -> dict[
 
 
 def _place(name: str, surfaces: Sequence[str], every: int) -> str:
-    """Return "FDM: Foot, Left Hand" or, of a table with many surfaces, "FDM: all"."""
+    """Return "FDM: face, hand" or, where a table has many surfaces, "FDM: all"."""
     all_of_many = len(surfaces) == every > 2
     return f"{name}: {'all' if all_of_many else ', '.join(surfaces)}"
 

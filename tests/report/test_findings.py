@@ -157,7 +157,9 @@ NEARLY = [0.94, 1.004, 1.006, 1.008, 1.009, 1.015, 1.02, 1.02, 1.03]
 
 def test_smallest_is_said_only_of_an_interval_without_one(evidence):
     head, counts, *_ = words_of(findings(with_angles(evidence, cem=NEARLY, fdm=[1.0] * 9), {}, []))
-    assert head.startswith("On 9 surfaces, FDM and CEM have equally good angle errors; those of CEM are ")
+    assert head.startswith(
+        "On 9 surfaces, FDM and CEM have equally good angle errors; those of CEM are "
+    )
     assert "median 1.009)" in head
     assert (
         "CEM has the smallest angle errors in 11 % of 9 families (95 % interval 2 to 43) and is "
@@ -176,7 +178,7 @@ def test_an_algorithm_with_one_wrecked_map_is_not_shown_to_be_worse(evidence):
     wrecked = {"fdm": [1.0] * 9, "cem": [1.14] * 9, "ldm": [1.0] * 8 + [30.0]}
     head = findings(with_angles(evidence, **wrecked), {}, [])
     assert words_of(head)[0].startswith(
-        "On 9 surfaces, FDM has the smallest angle errors (not decided against LDM); those of CEM are "
+        "On 9 surfaces, FDM has the smallest angle errors (not decided against LDM); those of CEM "
     )
     assert head.suspects == ("LDM on mine-8: 30 degrees, the other algorithms' median is 1.07",)
 

@@ -41,6 +41,18 @@ Row = Mapping[str, Any]
 Variant = tuple[tuple[str, str], ...]
 
 
+def in_lists(title: str) -> str:
+    """Return an algorithm's title without a comma outside brackets, since titles stand in lists.
+
+    >>> in_lists("CETM, flips"), in_lists("FDM, its authors' program (external)"), in_lists("CEM")
+    ('CETM (flips)', "FDM (its authors' program, external)", 'CEM')
+    """
+    name, comma, rest = title.partition(", ")
+    if not comma or "(" in name:
+        return title
+    return f"{name} ({rest.replace(' (', ', ').replace(')', '')})"
+
+
 @dataclass(frozen=True)
 class AlgorithmSeries:
     """An algorithm with one choice of parameters: a column of tables and a colour of plots.
@@ -327,8 +339,7 @@ class Evidence:
                 title, target = about[name].title, about[name].target
                 if titles[title] > 1:
                     title = f"{title} ({name})"
-                if ", " in title:  # names stand in lists: "CETM (flips)" is one, "CETM, flips" two
-                    title = f"{title.replace(', ', ' (', 1)})"
+                title = in_lists(title)
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
                 series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(series)
