@@ -26,7 +26,7 @@ from cembench.running.surfaces import SurfaceFile, file_named, is_generated
 
 Complex = NDArray[np.complex128]
 #: Notices, each with the file it is about.
-Told = tuple[tuple[Path, Notice], ...]
+Notices = tuple[tuple[Path, Notice], ...]
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ class Mapped:
     #: Kinds of outputs written, with their files.
     written: Mapping[str, str]
     #: Notices about the written files.
-    told: Told = ()
+    notices: Notices = ()
     #: What the bounds of the surface's modulus say of the map, if that was asked for.
     certificate: str = ""
     #: What the refined mesh is that the map is on, if that was asked for.
@@ -141,7 +141,7 @@ class Maps:
                 mapped = self._mapped(file, surface, task)
                 own.append(mapped)
                 if len(own) == len(file.tasks):
-                    mapped = replace(mapped, told=(*mapped.told, *self._write(file, own)))
+                    mapped = replace(mapped, notices=(*mapped.notices, *self._write(file, own)))
                 self.done.append(mapped)
                 yield mapped
         if self.output is not None and (maps := self._maps(self.done, self.output)):
@@ -161,7 +161,7 @@ class Maps:
             self.missing.append(output)
         return []
 
-    def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Told:
+    def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Notices:
         notices: tuple[Notice, ...] = ()
         maps = self._maps(own, file.output)
         shells = Shells.of([m.surface for m in own]) if self.overlay else file.shells
@@ -190,7 +190,7 @@ class Maps:
         mapped = Mapped(surface, record, uv, {}, certificate=proof, overlay=words)
         if uv is None or not self.writes(mapped):
             return mapped
-        noticed: Told = ()
+        noticed: Notices = ()
         extras = self.file_options.extras
         files = {"output": file.output, **extras, "preview": file.picture}
         if extras:
@@ -198,7 +198,7 @@ class Maps:
                 notices = write_extras(self.file_options, mesh, uv, record)
             noticed = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
-        return replace(mapped, written=written, told=noticed)
+        return replace(mapped, written=written, notices=noticed)
 
 
 def _overlay(fine: TriangleMesh, coarse: TriangleMesh) -> str:

@@ -53,7 +53,7 @@ def map_(
         reporter=SHOWN,
     )
     for mapped in maps:
-        for path, notice in mapped.told:
+        for path, notice in mapped.notices:
             note(f"{path}: {notice}")
         if not as_json:
             print_notices([mapped.surface.mesh])

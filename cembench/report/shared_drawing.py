@@ -23,7 +23,7 @@ class _Shared:
     """The processes, and what they were given to do."""
 
     pool: Executor
-    given: list[Future[Any]] = field(default_factory=list)
+    tasks: list[Future[Any]] = field(default_factory=list)
 
 
 _SHARED: ContextVar[_Shared | None] = ContextVar("_SHARED", default=None)
@@ -42,7 +42,7 @@ def shared_drawing(jobs: int) -> Iterator[None]:
             yield
         finally:
             _SHARED.reset(token)
-        for one in shared.given:
+        for one in shared.tasks:
             one.result()
 
 
@@ -58,4 +58,4 @@ def draw(function: Callable[..., None], *arguments: Any) -> None:
     if shared is None:
         function(*arguments)
     else:
-        shared.given.append(shared.pool.submit(function, *arguments))
+        shared.tasks.append(shared.pool.submit(function, *arguments))

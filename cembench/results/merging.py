@@ -112,10 +112,10 @@ def _beside(into: Store, machine: str) -> Store:
 
 
 def _best(
-    given: Sequence[tuple[Store, Sequence[Record], Mapping[str, dict[str, Any]]]],
+    held_by_runs: Sequence[tuple[Store, Sequence[Record], Mapping[str, dict[str, Any]]]],
 ) -> dict[tuple[str, str], Held]:
     best: dict[tuple[str, str], Held] = {}
-    for run, records, environments in given:
+    for run, records, environments in held_by_runs:
         for record in records:
             held = Held(record, run, machine_of_record(record, environments))
             place = record.cell.key, held.machine
