@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import io
 import re
 import shutil
@@ -11,24 +12,38 @@ from pathlib import Path
 
 from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section, Table
-from cembench.core.atomic import write_text
+from cembench.core.atomic import write_bytes, write_text
 
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
-#: Links to what is left out, and the forms of a figure besides its picture and data.
+#: The records of a report, and of one that is kept: text of numbers packs to a third.
+RECORDS, PACKED = "records.csv", "records.csv.gz"
+#: Numbers longer than this many digits, which records are rounded to.
+DIGITS, LONG = 8, re.compile(r"-?\d+\.\d{7,}(?:e[+-]?\d+)?")
+#: Links to what is left out, and the forms of a figure besides its picture: the records hold the
+#: values that it was drawn from.
 LINKS = re.compile(r"\[([^\]]*)\]\((?:records\.md#|pages/)[^)]*\)")
-FORMS = re.compile(r"\[(?:SVG|PDF)\]\([^)]*\),? ?")
+FORMS = re.compile(r" ?\((?:\[(?:SVG|PDF|data)\]\([^)]*\)(?:, )?)+\)")
 FILES = re.compile(r"\]\(((?:figures|tables)/[^)#]*)")
 
 
 def shortened(page: str, report: str) -> str:
     """Return a report's page without links to what is not kept; `report` is its kept folder."""
-    page = FORMS.sub("", LINKS.sub(r"\1", page))
+    page = FORMS.sub("", LINKS.sub(r"\1", page)).replace(f"({RECORDS})", f"({PACKED})")
     return re.sub(r"(Made by `cembench report \S+ -o )\S+`", rf"\1{report}`", page)
 
 
+def records_of(report: Path) -> list[dict[str, str]]:
+    """Return the records of a report, a kept one or not, as rows of text."""
+    csv.field_size_limit(2**31 - 1)
+    packed = report / PACKED
+    data = gzip.decompress(packed.read_bytes()) if packed.is_file() else b""
+    text = data.decode() or (report / RECORDS).read_text(encoding="utf-8")
+    return list(csv.DictReader(io.StringIO(text)))
+
+
 def short_records(text: str) -> str:
-    """Return records in CSV without the columns that are left out."""
+    """Return records in CSV without the columns that are left out, and with rounded numbers."""
     csv.field_size_limit(2**31 - 1)
     rows = list(csv.DictReader(io.StringIO(text)))
     columns = [name for name in rows[0] if name not in LEFT_OUT]
@@ -36,7 +51,16 @@ def short_records(text: str) -> str:
     writer = csv.DictWriter(lines, columns, extrasaction="ignore", lineterminator="\n")
     writer.writeheader()
     writer.writerows(rows)
-    return lines.getvalue()
+    return rounded(lines.getvalue())
+
+
+def rounded(text: str) -> str:
+    """Return text with all numbers in it rounded.
+
+    >>> rounded("[0.12345678901234567, 1.5e-12, 1.23456789012e-05]")
+    '[0.12345679, 1.5e-12, 1.2345679e-05]'
+    """
+    return LONG.sub(lambda number: f"{float(number[0]):.{DIGITS}g}", text)
 
 
 def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: str = "") -> Section:
@@ -48,13 +72,14 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
 
     Pages and pictures of every surface, and every figure in three forms, make a clone heavy;
     `cembench report` makes them again from a run. Records are kept without their histories and
-    phases. The folder is replaced if it holds a report. A folder of `hide`, one that others do not
-    have, is named by its last part. `run` is the command that measured it, for `make refresh`.
+    phases, with eight digits, packed. The folder is replaced if it holds a report. A folder of
+    `hide`, one that others do not have, is named by its last part. `run` is the command that
+    measured it, for `make refresh`.
     """
     folder = folder.absolute()
     name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
     page = shortened((report / "report.md").read_text(encoding="utf-8"), name.as_posix())
-    records = short_records((report / "records.csv").read_text(encoding="utf-8"))
+    records = short_records((report / RECORDS).read_text(encoding="utf-8"))
     if folder.exists():
         if not (folder / "report.md").exists():
             raise SystemExit(f"{folder} is there, but holds no report to replace.")
@@ -63,7 +88,9 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         shutil.copy(report / file, folder / file)
     write_text(folder / "report.md", page)
-    write_text(folder / "records.csv", records)
+    for path in hide:
+        records = records.replace(str(path), path.name)
+    write_bytes(folder / PACKED, gzip.compress(records.encode(), mtime=0))
     for file in folder.rglob("*"):
         if file.suffix in (".md", ".csv"):
             text = shown = file.read_text(encoding="utf-8")

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.kept_report import PACKED, RECORDS, records_of
 from benchmarks.pages import ROOT, Section, Table
 from cembench.results.families import rate_interval
 from cembench.results.multiple_testing import geometric
@@ -26,13 +27,13 @@ def averages(file: Path) -> dict[str, dict[str, str]]:
     return {row["reading"]: row for row in _rows(file)}
 
 
-def ratios(records: Path, algorithm: str, policy: str) -> list[list[float]]:
+def ratios(report: Path, algorithm: str, policy: str) -> list[list[float]]:
     """Return t / t_CEM of each round, for every model of the paper once.
 
     A model that was measured itself counts, and not its stand-in; of a method with several sets of
     parameters the one that was measured on most surfaces.
     """
-    there = [row for row in _rows(records) if row["solves"] == policy and row["status"] == "ok"]
+    there = [row for row in records_of(report) if row["solves"] == policy and row["status"] == "ok"]
     counts = Counter((row["algorithm"], row["parameters"]) for row in there)
     rows: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):
@@ -54,11 +55,11 @@ def _paired(row: dict[str, str], base: dict[str, str]) -> list[float]:
     return [a / b for a, b in zip(ours, theirs, strict=False)]
 
 
-def interval(records: Path, algorithm: str, policy: str, reading: str) -> str:
+def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
-    if not records.exists():
+    if not {PACKED, RECORDS} & {file.name for file in report.iterdir()}:
         return ""
-    rate = rate_interval(ratios(records, algorithm, policy), log=reading == GEOMETRIC)
+    rate = rate_interval(ratios(report, algorithm, policy), log=reading == GEOMETRIC)
     return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
@@ -88,7 +89,7 @@ def readme_speedups(*, report: Path | None = None) -> Section:
             **{
                 policy: [
                     f"{float(averages[reading][f'{name} here']):.1f}"
-                    + interval(folders[policy] / "records.csv", name.lower(), policy, reading)
+                    + interval(folders[policy], name.lower(), policy, reading)
                     for reading in AVERAGES
                 ]
                 for policy, averages in by_policy.items()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 from collections import Counter, defaultdict
 from pathlib import Path
 from statistics import mean
@@ -10,6 +9,7 @@ from statistics import mean
 import matplotlib as mpl
 import numpy as np
 
+from benchmarks.kept_report import records_of
 from benchmarks.measuring import png
 from benchmarks.pages import ROOT, Section
 from cembench.results.families import family_means, share_interval
@@ -22,14 +22,12 @@ TARGETS = {"disk": "#0072B2", "free boundary": "#D55E00"}
 SHARES = (10, 50, 90)
 
 
-def by_algorithm(records: Path) -> dict[str, list[dict[str, str]]]:
+def by_algorithm(report: Path) -> dict[str, list[dict[str, str]]]:
     """Return the rows of maps to the disk or with a free boundary, by the algorithm's title."""
-    csv.field_size_limit(2**31 - 1)
     values = defaultdict(list)
-    with records.open(encoding="utf-8", newline="") as lines:
-        for row in csv.DictReader(lines):
-            if row["target"] in TARGETS:
-                values[row["title"]].append(row)
+    for row in records_of(report):
+        if row["target"] in TARGETS:
+            values[row["title"]].append(row)
     return dict(values)
 
 
@@ -66,7 +64,7 @@ def _percentiles(weighted: list[tuple[float, float]]) -> list[float]:
 
 def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
     """Draw how often, how well and how fast algorithms map the real disks, from a kept report."""
-    rows = by_algorithm(report / "records.csv")
+    rows = by_algorithm(report)
     errors = over_best(rows, "angle_error_mean_deg")
     seconds = over_best(rows, "seconds")
     names = sorted(rows, key=lambda name: -_percentiles(errors[name])[1])

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import json
 import re
 import sys
 from typing import Any
 
+from benchmarks.kept_report import records_of
 from benchmarks.origins import changed, origins, working_tree
 from benchmarks.pages import ROOT, Section, Table
 from cembench.results.store import Store
@@ -57,9 +57,7 @@ def measured_seconds(report: str) -> float:
     if (ROOT / report / "records").is_dir():  # a kept run
         outcomes = [one.outcome for one in Store(ROOT / report).records()]
         return sum(sum(each.calls) for one in outcomes for each in one.rounds)
-    with (ROOT / report / "records.csv").open(newline="", encoding="utf-8") as lines:
-        rounds = [json.loads(row["seconds_raw"] or "[]") for row in csv.DictReader(lines)]
-    return sum(map(sum, rounds))
+    return sum(sum(json.loads(row["seconds_raw"] or "[]")) for row in records_of(ROOT / report))
 
 
 def stale(*, check: bool = False, refresh: bool = False) -> Section:

@@ -1,20 +1,21 @@
 """A kept report holds what its page shows, and links to nothing that was left out."""
 
-import csv
 import re
 from pathlib import Path
 
 import pytest
 
-from benchmarks.kept_report import LEFT_OUT, kept_report, short_records, shortened
+from benchmarks.kept_report import LEFT_OUT, kept_report, records_of, rounded, shortened
 from benchmarks.pages import ROOT
 
 
 def test_links_to_what_is_left_out_become_plain_text():
     page = "| [1.91](records.md#ab12) | [turtle](pages/surface-turtle.md) |\n"
     assert shortened(page, "reports/x") == "| 1.91 | turtle |\n"
-    forms = "([SVG](figures/a.svg), [PDF](figures/a.pdf), [data](figures/a.csv))"
-    assert shortened(forms, "reports/x") == "([data](figures/a.csv))"
+    forms = "All. ([SVG](figures/a.svg), [PDF](figures/a.pdf), [data](figures/a.csv))\n"
+    assert shortened(forms, "reports/x") == "All.\n"
+    records = "a line of [records.csv](records.csv)"
+    assert shortened(records, "reports/x") == "a line of [records.csv](records.csv.gz)"
     made = "Made by `cembench report results/x -o elsewhere`."
     assert shortened(made, "reports/x") == "Made by `cembench report results/x -o reports/x`."
 
@@ -26,7 +27,7 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
         (report / name).write_text(name)
     page = "![A](figures/a.png) ([SVG](figures/a.svg)) [CSV](tables/t.csv) [a](pages/surface-a.md)"
     (report / "report.md").write_text(page)
-    (report / "records.csv").write_text("mesh,phases,seconds\na,{},1.5\n")
+    (report / "records.csv").write_text("mesh,phases,seconds\na,{},1.5\nb,{},0.123456789012\n")
     kept.mkdir()
     (kept / "old.png").write_text("old")
     with pytest.raises(SystemExit, match="holds no report to replace"):
@@ -36,8 +37,12 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     kept_report(report, kept, hide=[Path("/home/me/meshes")])
     assert (kept / "tables/t.csv").read_text() == "meshes/a.obj"
     files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
-    assert files == {"report.md", "records.csv", "figures/a.png", "tables/t.csv"}
-    assert (kept / "records.csv").read_text() == "mesh,seconds\na,1.5\n"
+    assert files == {"report.md", "records.csv.gz", "figures/a.png", "tables/t.csv"}
+    rows = [{"mesh": "a", "seconds": "1.5"}, {"mesh": "b", "seconds": "0.12345679"}]
+    assert records_of(kept) == rows
+    first = (kept / "records.csv.gz").read_bytes()
+    kept_report(report, kept)
+    assert (kept / "records.csv.gz").read_bytes() == first
 
 
 @pytest.mark.parametrize("report", ["paper", "standard", "real"])
@@ -48,8 +53,7 @@ def test_every_link_of_a_kept_report_leads_somewhere(report):
 
 
 def test_records_of_the_real_surfaces_are_kept_in_short():
-    text = (ROOT / "reports/real/records.csv").read_text(encoding="utf-8")
-    assert short_records(text) == text
-    rows = list(csv.DictReader(text.splitlines()))
+    rows = records_of(ROOT / "reports/real")
+    assert all(rounded(value) == value for row in rows for value in row.values())
     assert not set(LEFT_OUT) & set(rows[0])
     assert len(rows) > 1000

@@ -39,7 +39,7 @@ def test_the_rounds_of_the_records_give_the_averages_of_the_tables(report, polic
     folder = ROOT / "reports" / report
     there = readme_speedups.averages(folder / "tables" / readme_speedups.POLICIES[policy])
     for name in ("QIEM", "FDM", "LDM"):
-        ratios = readme_speedups.ratios(folder / "records.csv", name.lower(), policy)
+        ratios = readme_speedups.ratios(folder, name.lower(), policy)
         figures = np.exp([np.median(np.log(one)) for one in ratios])
         for reading, average in readme_speedups.AVERAGES.items():
             rate = average(figures) - 1
