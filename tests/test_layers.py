@@ -72,7 +72,7 @@ BUDGETS = {
     "linear_algebra": 1_500,
     "conformal": 6_350,
     "registry": 950,
-    "results": 4_760,
+    "results": 4_800,
     "running": 7_270,
     "drawing": 1_500,
     "report": 7_470,

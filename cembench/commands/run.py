@@ -240,7 +240,7 @@ def merge(
     require_signed: RequireSigned = None,
     as_json: Json = False,
 ) -> None:
-    """Merge the records of several runs into one folder.
+    """Merge the records and exhibits of several runs into one folder.
 
     If several runs hold a cell, a record that ended ok is preferred, then the
     later one. Cells of several machines are not mixed: those of one machine go

@@ -13,9 +13,9 @@ from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict, model_validator
 
-from cembench.core.atomic import read_model, unwritable, write_model
+from cembench.core.atomic import read_model, unwritable, write_bytes, write_model
 from cembench.core.errors import RecordError
-from cembench.core.loading import check_no_link, files_in, is_there
+from cembench.core.loading import check_no_link, files_in, is_there, read_bytes
 from cembench.core.names import file_name
 from cembench.results import run_folder
 from cembench.results.records import MeshOrigin, Printable
@@ -161,3 +161,32 @@ def read_exhibits(run: Path) -> list[Exhibit]:
     """
     described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*", run)]
     return [read_model(path, Exhibit, run) for path in described if is_there(path)]
+
+
+def copy_exhibits(run: Path, into: Path) -> None:
+    """Copy the exhibits of a run, with their pictures, to another that does not have them.
+
+    Where it has a different exhibit of that name, as two runs over sets of surfaces have, the copy
+    is numbered.
+
+    Raises
+    ------
+    RecordError
+        A description or a picture cannot be read or written, or a link is in its place.
+
+    """
+    held = {one.name: one for one in read_exhibits(into)}
+    for exhibit in read_exhibits(run):
+        copy, number = exhibit, 1
+        while copy.name in held and held[copy.name] != copy:
+            number += 1
+            copy = exhibit.model_copy(update={"name": f"{exhibit.name}-{number}"})
+        if copy.name in held:
+            continue
+        folder = exhibit_folder(into, copy.name)
+        for picture in exhibit.pictures:
+            file = place_of(run, exhibit.name, picture.file)
+            if is_there(file):  # else a report names it as gone
+                write_bytes(place_of(into, copy.name, picture.file), read_bytes(file, run))
+        write_model(folder / _DESCRIPTION, copy)
+        held[copy.name] = copy

@@ -15,6 +15,7 @@ from typing import Any
 from cembench.core.loading import check_no_link, files_in
 from cembench.core.names import file_name
 from cembench.results.comparison import circumstances
+from cembench.results.exhibits import copy_exhibits
 from cembench.results.machines import machine_of_record
 from cembench.results.records import Record
 from cembench.results.store import Store
@@ -62,7 +63,7 @@ class Merged:
 
 
 def merge(runs: Iterable[Store], into: Store) -> Merged:
-    """Merge the records of several runs. All are read before anything is written.
+    """Merge the records and exhibits of several runs. All records are read before any is written.
 
     Of a cell that was measured on one machine several times, one that ended ok counts before one
     that did not, and then the later one. Of several machines the one counts that has more cells of
@@ -89,6 +90,8 @@ def merge(runs: Iterable[Store], into: Store) -> Merged:
             _beside(into, ordered[0].machine).forget(ordered[0].record.cell)
             if len(ordered) > 1:
                 conflicts.append(_conflict(ordered))
+        for run, *_ in read:
+            copy_exhibits(run.folder, into.folder)
         return Merged(len(cells), tuple(conflicts))
 
 

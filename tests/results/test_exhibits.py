@@ -6,6 +6,7 @@ from cembench.results.exhibits import (
     Exhibit,
     ExhibitPicture,
     ExhibitTable,
+    copy_exhibits,
     exhibit_folder,
     read_exhibits,
     write_exhibit,
@@ -49,3 +50,21 @@ def test_a_damaged_description_is_named(tmp_path):
 def test_a_row_has_a_value_for_each_column():
     with pytest.raises(ValidationError, match="a row does not have 2 values"):
         ExhibitTable(title="steps", columns=("step", "off"), rows=((1, 0.1), (None,)))
+
+
+def test_exhibits_are_copied_with_their_pictures_and_numbered_where_names_meet(tmp_path):
+    first, second, into = (tmp_path / name for name in ("first", "second", "into"))
+    other = exhibit().model_copy(update={"text": "Something else."})
+    for run, one in ((first, exhibit()), (second, other)):
+        (exhibit_folder(run, "koebe") / "steps.png").write_bytes(run.name.encode())
+        write_exhibit(run, one)
+    for _ in range(2):  # the second time nothing is new
+        for run in (first, second, first):
+            copy_exhibits(run, into)
+    numbered = other.model_copy(update={"name": "koebe-2"})
+    assert read_exhibits(into) == [exhibit(), numbered]
+    pictures = [into / "exhibits" / name / "steps.png" for name in ("koebe", "koebe-2")]
+    assert [picture.read_bytes() for picture in pictures] == [b"first", b"second"]
+    (first / "exhibits/koebe/steps.png").unlink()
+    copy_exhibits(first, tmp_path / "third")  # the report says that the picture is gone
+    assert read_exhibits(tmp_path / "third") == [exhibit()]
