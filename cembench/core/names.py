@@ -114,6 +114,18 @@ def digest(name: str) -> str:
     return hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()
 
 
+def in_lists(title: str) -> str:
+    """Return an algorithm's title without a comma outside brackets, since titles stand in lists.
+
+    >>> in_lists("CETM, flips"), in_lists("FDM, its authors' program (external)"), in_lists("CEM")
+    ('CETM (flips)', "FDM (its authors' program, external)", 'CEM')
+    """
+    name, comma, rest = title.partition(", ")
+    if not comma or "(" in name:
+        return title
+    return f"{name} ({rest.replace(' (', ', ').replace(')', '')})"
+
+
 def _is_ordinary(name: str, longest: int) -> bool:
     """Whether every common system accepts a name as a file name."""
     return (

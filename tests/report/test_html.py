@@ -217,6 +217,7 @@ def test_keys_of_records_are_as_long_as_they_must_be_to_differ(tmp_path):
 def test_a_filter_offers_what_records_differ_in_and_knows_the_names_of_tables(tmp_path):
     rows = [("lion-stand-in", "Lion", "cem", "CEM"), ("foot", None, "cem", "CEM")]
     rows += [("foot", None, "bff", "BFF"), ("foot", None, "bff-igl", "BFF")]
+    rows += [("foot", None, "cetm-flips", "CETM, flips")]
     columns = ("mesh", "paper_row", "algorithm", "title", "status")
     records = {f"k{n}": dict(zip(columns, (*row, "ok"), strict=True)) for n, row in enumerate(rows)}
     page = page_of(report_of(records=records), tmp_path)
@@ -227,9 +228,12 @@ def test_a_filter_offers_what_records_differ_in_and_knows_the_names_of_tables(tm
         ("algorithm", "BFF (bff)"),
         ("algorithm", "BFF (bff-igl)"),
         ("algorithm", "CEM"),
+        ("algorithm", "CETM (flips)"),
     ]
     store = store_of(page)
-    assert store["cells"] == {"k0": [1, 2, 0], "k1": [0, 2, 0], "k2": [0, 0, 0], "k3": [0, 1, 0]}
+    choices = [[1, 2, 0], [0, 2, 0], [0, 0, 0], [0, 1, 0], [0, 3, 0]]
+    assert store["cells"] == {f"k{n}": own for n, own in enumerate(choices)}
+    assert store["names"]["cetm-flips"] == store["names"]["CETM (flips)"] == [1, 3]  # as in tables
     assert store["names"]["lion-stand-in"] == store["names"]["Lion"] == [0, 1]
     assert store["names"]["bff"] == [1, 0]
     assert "BFF" not in store["names"]  # it could mean either

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import RecordError
 from cembench.core.loading import damaged
-from cembench.core.names import distinct_slugs
+from cembench.core.names import distinct_slugs, in_lists
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
@@ -39,18 +39,6 @@ AS_GOOD, DEGREES = 1.25, 0.25
 Row = Mapping[str, Any]
 #: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
-
-
-def in_lists(title: str) -> str:
-    """Return an algorithm's title without a comma outside brackets, since titles stand in lists.
-
-    >>> in_lists("CETM, flips"), in_lists("FDM, its authors' program (external)"), in_lists("CEM")
-    ('CETM (flips)', "FDM (its authors' program, external)", 'CEM')
-    """
-    name, comma, rest = title.partition(", ")
-    if not comma or "(" in name:
-        return title
-    return f"{name} ({rest.replace(' (', ', ').replace(')', '')})"
 
 
 @dataclass(frozen=True)

@@ -29,6 +29,7 @@ import jinja2
 from markupsafe import Markup, escape
 
 from cembench.core.atomic import write_text
+from cembench.core.names import in_lists
 from cembench.report.document import (
     ORIGINS,
     Claim,
@@ -105,8 +106,9 @@ def _printed(records: Rows) -> dict[str, tuple[str, str, str]]:
     def of(row: Mapping[str, Any]) -> tuple[str, str, str]:
         name = row.get("algorithm")
         title = titles[name] if often[titles[name]] == 1 else f"{titles[name]} ({name})"
+        title = in_lists(str(title or ""))
         surface = row.get("paper_row") or row.get("mesh")
-        return str(surface or ""), str(title or ""), str(row.get("status") or "")
+        return str(surface or ""), title, str(row.get("status") or "")
 
     return {key: of(row) for key, row in records.items()}
 
