@@ -197,11 +197,15 @@ def test_a_footer_of_another_origin_does_not_unmark_a_column(tmp_path):
 def test_a_number_links_to_its_record_if_the_report_holds_it(tmp_path):
     values = Value("1.0", 1.0, "model", "known"), Value("2.0", 2.0, "model", "lost")
     table = table_of(("a", "b"), (Value("x"), *values))
+    calls = [[0.123456789, 2], [1e-9 / 3]]
     records = {"known": {"mesh": "x", "algorithm": "cem", "seconds": 1.0, "cause": None}}
+    records["known"] |= {"energy": 0.1 + 0.2, "calls": calls}
     page = page_of(report_of(table, records=records), tmp_path)
     assert [a["href"] for a in page.all("a", **{"class": "figure-link"})] == ["#record-known"]
     fields = store_of(page)["records"]["known"]["fields"]
     assert ["seconds", [["", "1.0"]]] in fields
+    assert ["energy", [["", "0.30000000000000004"]]] in fields
+    assert ["calls", [["", "[[0.123457, 2], [3.33333e-10]]"]]] in fields
     assert "cause" not in dict(fields)
 
 
