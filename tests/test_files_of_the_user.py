@@ -181,7 +181,7 @@ def test_force_writes_over_the_input_and_a_picture_of_somebody(cli, decoys):
     assert cli(*call)[0] == 2
     code, out, _ = cli(*call, "--force")
     assert code == 0
-    assert "output  flat.obj" in out
+    assert "output     flat.obj" in out
     assert b"\nvt " in (cli.folder / "flat.obj").read_bytes()
     assert (cli.folder / "hard.obj").read_bytes() == before
     with Image.open(cli.folder / "flat.png") as picture:

@@ -99,7 +99,7 @@ def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
     words = (("overlay", mapped.overlay), ("certificate", mapped.certificate))
     out.print(figures_table(mapped.record, full=verbose, more=words))
     for what, where in mapped.written.items():
-        print_pair(what, where)
+        print_pair(f"{what:<9}", where)  # below the figures
     if mapped.uv is not None and not mapped.written:
         more = "" if mapped.ok or keep_invalid else " --keep-invalid"
         out.print(f"Nothing was written; add{more} -o FILE.obj to keep the map.", style="dim")
