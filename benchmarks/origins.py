@@ -43,8 +43,13 @@ _ALL = ("cembench/registry.py", "cembench/__init__.py")
 #: Fields of a syntax tree that change nothing: how a name is used, and how a text is written.
 _NO_MEANING = ("ctx", "kind", "type_comment")
 _IMPORTS = (ast.Import, ast.ImportFrom)
-#: What writes pages, and makes no figure.
-_WRITING = ("benchmarks/pages.py", "benchmarks/origins.py")
+#: What writes pages, or carries, combines and tells results: it makes none. What a paper printed,
+#: claims and measured with is data.
+_CARRYING = ("exhibits", "frame", "merging", "papers", "power_law")
+_NO_FIGURES = (
+    *("benchmarks/pages.py", "benchmarks/origins.py"),
+    *(f"cembench/results/{name}.py" for name in _CARRYING),
+)
 
 
 def working_tree() -> dict[str, str]:
@@ -75,7 +80,7 @@ def hashes(tree: Tree, start: str) -> dict[str, str]:
         return {}
     texts: dict[str, list[str]] = {}
     for file in sorted(_closure(tree, start)):
-        if file in _WRITING:
+        if file in _NO_FIGURES:
             continue
         group = next((g for g, places in GROUPS.items() if file.startswith(places)), None)
         if group is not None:

@@ -12,6 +12,7 @@ import numpy as np
 from benchmarks.kept_report import records_of
 from benchmarks.measuring import png
 from benchmarks.pages import ROOT, Section
+from cembench.report.content.findings import FLOOR
 from cembench.results.families import family_means, share_interval
 
 mpl.use("Agg")
@@ -37,15 +38,18 @@ def family_of(row: dict[str, str]) -> str:
 
 
 def over_best(
-    rows: dict[str, list[dict[str, str]]], column: str
+    rows: dict[str, list[dict[str, str]]], column: str, least: float = 0.0
 ) -> dict[str, list[tuple[float, float]]]:
     """Return each valid map's figure over the smallest on its surface, by algorithm.
 
-    Beside it is its weight: a family's is divided among its surfaces.
+    Beside it is its weight: a family's is divided among its surfaces. Smaller figures than `least`
+    count as this: on a flat surface the best error is rounding.
     """
     families = {r["mesh_hash"]: family_of(r) for some in rows.values() for r in some}
-    valid = {name: {r["mesh_hash"]: float(r[column]) for r in some if r["status"] == "ok"}
-             for name, some in rows.items()}  # fmt: skip
+    valid = {
+        name: {r["mesh_hash"]: max(float(r[column]), least) for r in some if r["status"] == "ok"}
+        for name, some in rows.items()
+    }
     best: dict[str, float] = {}
     for figures in valid.values():
         for surface, figure in figures.items():
@@ -65,7 +69,7 @@ def _percentiles(weighted: list[tuple[float, float]]) -> list[float]:
 def real_picture(*, report: Path = ROOT / "reports/real") -> Section:
     """Draw how often, how well and how fast algorithms map the real disks, from a kept report."""
     rows = by_algorithm(report)
-    errors = over_best(rows, "angle_error_mean_deg")
+    errors = over_best(rows, "angle_error_mean_deg", FLOOR)
     seconds = over_best(rows, "seconds")
     names = sorted(rows, key=lambda name: -_percentiles(errors[name])[1])
     colours = [TARGETS[rows[name][0]["target"]] for name in names]

@@ -388,19 +388,19 @@ def against_reference(
 
 def _compared(
     reference: Record | None,
-    comparison: Comparison | None,
+    found: Comparison | None,
     together: Comparison | None,
     cpu: Comparison | None,
 ) -> dict[str, Any]:
     """Return the columns of the speedup of the reference and its verdicts."""
-    interval = comparison.speedup_interval if comparison else None
+    interval = found.speedup_interval if found else None
     cpu_interval = cpu.interval if cpu else None
     return {
-        "reference": reference.cell.algorithm if comparison and reference else None,
-        "speedup": comparison.speedup if comparison else None,
+        "reference": reference.cell.algorithm if found and reference else None,
+        "speedup": found.speedup if found else None,
         "speedup_low": interval.low if interval else None,
         "speedup_high": interval.high if interval else None,
-        "verdict": comparison.verdict if comparison else None,
+        "verdict": found.verdict if found else None,
         "verdict_corrected": together.verdict if together else None,
         "p": together.p if together else None,
         "cpu_ratio": cpu.ratio if cpu else None,

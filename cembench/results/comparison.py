@@ -150,9 +150,9 @@ def disturbance(
     return ratio_interval([a / b for a, b in zip(together, separate, strict=True)], share)
 
 
-def agree(disturbed: Interval | None) -> bool:
+def agree(found: Interval | None) -> bool:
     """Whether the shared processes are known to show the same ratio as separate ones."""
-    return disturbed is not None and 1 in disturbed
+    return found is not None and 1 in found
 
 
 def _ratios(times: Sequence[tuple[float | None, float | None]]) -> list[float]:
@@ -186,16 +186,16 @@ def compare(record: Record, reference: Record) -> Comparison | None:
     return confirmed(alone, measured_ratios(record, reference), share)
 
 
-def confirmed(decided: Comparison, measured: Sequence[float], share: float = 1.0) -> Comparison:
+def confirmed(found: Comparison, measured: Sequence[float], share: float = 1.0) -> Comparison:
     """Return a comparison with its verdict only if other ratios of its rounds have the same one.
 
     They are those by our clock, which differ only for an external program that prints its solve
     time: its own word never decides a comparison alone.
     """
     ours = compare_ratios(measured, share) if measured else None
-    if ours is not None and ours.verdict == decided.verdict:
-        return replace(decided, p=max(decided.p, ours.p))
-    return replace(decided, verdict="undecided", p=1.0) if decided.p < 1 else decided
+    if ours is not None and ours.verdict == found.verdict:
+        return replace(found, p=max(found.p, ours.p))
+    return replace(found, verdict="undecided", p=1.0) if found.p < 1 else found
 
 
 def compare_cpu(record: Record, reference: Record) -> Comparison | None:

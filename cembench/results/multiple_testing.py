@@ -41,19 +41,19 @@ def holm(chances: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def corrected(compared: Sequence[Comparison]) -> list[Comparison]:
+def corrected(found: Sequence[Comparison]) -> list[Comparison]:
     """Return comparisons with verdicts that are all correct with probability 95 %.
 
     A verdict is kept if its own exact interval shows it, and if its p-value is also significant
     among so many (:mod:`cembench.results.rank_tests`). The intervals stay single ones: each
     holds its ratio with 95 %, not all of them at once.
     """
-    tested = [one.p for one in compared if one.interval is not None]
+    tested = [one.p for one in found if one.interval is not None]
     if len(tested) < 2:
-        return list(compared)
+        return list(found)
     chances = iter(holm(tested))
     verdicts = []
-    for one in compared:
+    for one in found:
         p = next(chances) if one.interval is not None else 1.0
         lost = p > ERROR and one.verdict in ("faster", "slower")
         verdicts.append(replace(one, p=p, verdict="undecided") if lost else replace(one, p=p))

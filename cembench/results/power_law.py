@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import nan
 
 import numpy as np
 
@@ -20,24 +19,24 @@ class PowerLaw:
 
     factor: float
     exponent: float
-    error: float = nan
-    n: int = 0
+    error: float
+    n: int
 
     def at(self, x: float) -> float:
         """Return y for this x."""
         return self.factor * x**self.exponent
 
 
-def fit(points: Sequence[tuple[float, float]], fewest: int = FEWEST) -> PowerLaw | None:
+def fit(points: Sequence[tuple[float, float]]) -> PowerLaw | None:
     """Return the power law fitted to the logarithms of points (x, y) by least squares.
 
-    None for fewer than `fewest` different x, or where they hardly differ.
+    None for fewer than :data:`FEWEST` different x, or where they hardly differ.
 
     >>> law = fit([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
     >>> round(law.exponent, 6), round(law.factor, 6)
     (1.5, 3.0)
     """
-    if len({x for x, _ in points}) < fewest:
+    if len({x for x, _ in points}) < FEWEST:
         return None
     x, y = np.log(np.array(points, dtype=float)).T
     off, n = x - x.mean(), len(x)
@@ -46,11 +45,5 @@ def fit(points: Sequence[tuple[float, float]], fewest: int = FEWEST) -> PowerLaw
         return None
     exponent = float((off * y).sum()) / spread
     rest = y - y.mean() - exponent * off
-    error = float(np.sqrt((rest**2).sum() / (n - 2) / spread)) if n > 2 else nan
+    error = float(np.sqrt((rest**2).sum() / (n - 2) / spread))
     return PowerLaw(float(np.exp(y.mean() - exponent * x.mean())), exponent, error, n)
-
-
-def through_middle(points: Sequence[tuple[float, float]], exponent: float) -> PowerLaw:
-    """Return the power law with this exponent through the geometric mean of points."""
-    x, y = np.log(np.array(points, dtype=float)).T.mean(axis=1)
-    return PowerLaw(float(np.exp(y - exponent * x)), exponent, n=len(points))

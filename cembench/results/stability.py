@@ -105,11 +105,11 @@ def _line(maps: Sequence[Outlier]) -> str:
     )
 
 
-def _is_conformal(outlier: Outlier) -> bool:
+def _is_conformal(found: Outlier) -> bool:
     """Whether the algorithm promises conformal maps; those of plug-ins are taken to."""
     from cembench.registry import load_registry
 
-    known = load_registry().algorithms.get(outlier.record.cell.algorithm)
+    known = load_registry().algorithms.get(found.record.cell.algorithm)
     return known is None or known.conformal
 
 

@@ -119,9 +119,9 @@ def sound_records(store: Store, depth: Depth) -> list[Record]:
     return list(verified.records)
 
 
-def _refusal(store: Store, findings: Sequence[Finding]) -> RecordError:
-    named = "\n".join(f"  {finding}" for finding in findings[:_NAMED])
-    more = f"\n  and {len(findings) - _NAMED} more" if len(findings) > _NAMED else ""
+def _refusal(store: Store, found: Sequence[Finding]) -> RecordError:
+    named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
+    more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     return RecordError.about(
         "{folder} cannot be used: its records or maps were changed after measuring.\n"
         "{named}{more}\nDelete these files and run again, or restore them. {everything} compares "

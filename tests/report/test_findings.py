@@ -262,3 +262,20 @@ def test_the_head_says_how_many_times_are_unstable(evidence):
     assert f" of {timed} times " in times
     assert " unstable (95 % interval wider than 10% of the figure)" in times
     assert ratios.startswith("Ratios of two algorithms scatter by ")
+
+
+def test_surfaces_without_a_common_round_do_not_hide_who_is_the_fastest(evidence):
+    both = with_angles(evidence, cem=[1.0] * 9, fdm=[1.0] * 9)
+
+    def words_on_speed(run):
+        return next(
+            figure.words for figure in findings(run, {}, []).figures if "speed" in figure.words
+        )
+
+    assert "over 9 families" in words_on_speed(both)
+    apart = next(r for r in both.records if r.cell.algorithm == "fdm" and r.outcome.rounds)
+    rounds = tuple(one.model_copy(update={"sitting": "later"}) for one in apart.outcome.rounds)
+    outcome = apart.outcome.model_copy(update={"rounds": rounds})
+    later = apart.model_copy(update={"outcome": outcome})
+    records = tuple(later if record is apart else record for record in both.records)
+    assert "over 8 families" in words_on_speed(replace(both, records=records))

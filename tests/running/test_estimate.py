@@ -6,7 +6,7 @@ from cembench.running.estimate import (
     LARGE,
     estimate,
     expected_bytes,
-    law_of,
+    fit_power_law,
 )
 from cembench.running.usual_costs import USUAL, USUAL_BYTES
 from tests.results.test_comparison import record_of
@@ -19,11 +19,10 @@ def known(faces, seconds, **cell):
     return record.model_copy(update={"mesh": mesh, "outcome": outcome})
 
 
-def test_one_size_has_the_usual_exponent_and_two_have_their_own():
-    one = law_of([(100.0, 2.0), (100.0, 8.0)])
-    assert one.at(100) == pytest.approx(4)  # the geometric mean
-    assert one.exponent == law_of([(7.0, 1.0)]).exponent > 1
-    assert law_of([(100.0, 2.0), (200.0, 8.0)]).exponent == pytest.approx(2)
+def test_a_power_law_is_found_again():
+    law = fit_power_law([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
+    assert (law.factor, law.exponent) == (pytest.approx(3), pytest.approx(1.5))
+    assert fit_power_law([(100.0, 2.0)]).at(100) == pytest.approx(2)
 
 
 def test_the_same_cell_counts_before_other_sizes_and_those_before_what_is_usual():

@@ -113,8 +113,9 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
         if not known["few"]:
             around = [share_interval(share, known["families"]) for share in known["smallest"]]
             known["shares"] = [(100 * one.low, 100 * one.high) for one in around]
-    speeds = _speeds(evidence, keys, good, families) if len(good) > 1 else None
+    speeds, timed = _speeds(evidence, keys, good, families) if len(good) > 1 else (None, 0)
     known |= {"rounds": speeds.rounds if speeds else 0, "verdict": speeds and speeds.verdict}
+    known |= {"timed": timed, "few_timed": timed < FEWEST_FAMILIES}
     known |= {
         "speeds": _ends(speeds.interval if speeds else None),
         "speed_ratio": speeds and speeds.ratio,
@@ -141,22 +142,26 @@ def _over_families(values: pd.Series, families: Sequence[str]) -> Over:
 
 def _speeds(
     evidence: Evidence, keys: pd.DataFrame, good: Sequence[str], families: Sequence[str]
-) -> Comparison | None:
+) -> tuple[Comparison | None, int]:
     """Compare the two fastest algorithms by the ratios of their seconds within rounds.
 
     With enough families the ratios of these decide, which is a statement on other families;
-    otherwise the means over the surfaces in each round do, a statement on these surfaces.
+    otherwise the means over the surfaces in each round do, a statement on these surfaces. Surfaces
+    on which they share no round are left out. The second value is the number of families.
     """
     slower, faster = ([evidence.by_key[key] for key in keys[good[k]]] for k in (1, 0))
-    ratios = [paired_ratios(a, b) for a, b in zip(slower, faster, strict=True)]
-    rounds = min(map(len, ratios))
-    if not rounds:
-        return None
+    paired = [paired_ratios(a, b) for a, b in zip(slower, faster, strict=True)]
+    families = [family for family, ratios in zip(families, paired, strict=True) if ratios]
+    ratios = list(filter(None, paired))
+    if not ratios:
+        return None, 0
     if len(set(families)) >= FEWEST_FAMILIES:
         logs = [median(map(log, ratio)) for ratio in ratios]
-        return compare_ratios([exp(one) for one in family_means(logs, families)])
+        by_family = [exp(one) for one in family_means(logs, families)]
+        return compare_ratios(by_family), len(by_family)
+    rounds = min(map(len, ratios))
     together = np.log([ratio[:rounds] for ratio in ratios]).mean(axis=0)
-    return compare_ratios(np.exp(together).tolist())
+    return compare_ratios(np.exp(together).tolist()), len(set(families))
 
 
 def listed(names: Sequence[str]) -> str:
