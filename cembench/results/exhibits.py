@@ -180,7 +180,8 @@ def copy_exhibits(run: Path, into: Path) -> None:
         copy, number = exhibit, 1
         while copy.name in held and held[copy.name] != copy:
             number += 1
-            copy = exhibit.model_copy(update={"name": f"{exhibit.name}-{number}"})
+            names = {"name": f"{exhibit.name}-{number}", "title": f"{exhibit.title} ({number})"}
+            copy = exhibit.model_copy(update=names)
         if copy.name in held:
             continue
         folder = exhibit_folder(into, copy.name)

@@ -61,7 +61,8 @@ def test_exhibits_are_copied_with_their_pictures_and_numbered_where_names_meet(t
     for _ in range(2):  # the second time nothing is new
         for run in (first, second, first):
             copy_exhibits(run, into)
-    numbered = other.model_copy(update={"name": "koebe-2"})
+    names = {"name": "koebe-2", "title": "Steps of Koebe's method (2)"}
+    numbered = other.model_copy(update=names)
     assert read_exhibits(into) == [exhibit(), numbered]
     pictures = [into / "exhibits" / name / "steps.png" for name in ("koebe", "koebe-2")]
     assert [picture.read_bytes() for picture in pictures] == [b"first", b"second"]
