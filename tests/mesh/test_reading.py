@@ -456,3 +456,26 @@ def test_the_polygons_come_in_blocks_of_one_size_in_order(tmp_path):
     blocks = read_soup(tmp_path / "a.obj").polygons
     assert [block.shape for block in blocks] == [(2, 3), (1, 4), (1, 3)]
     assert [face for block in blocks for face in block.tolist()] == faces
+
+
+def test_lines_of_a_text_ply_that_changed_places_are_no_mesh(tmp_path):
+    camera = ("element camera 1\nproperty float view\n", "1.5\n")
+    rows = OFF.splitlines(keepends=True)
+    text = ply(first=camera)
+    (tmp_path / "a.ply").write_text(text)
+    assert len(read_soup(tmp_path / "a.ply").V) == 4
+    # Read one after another there are as many numbers as before.
+    (tmp_path / "b.ply").write_text(
+        ply(first=(camera[0], rows[2]), rows=OFF.replace(rows[2], "1.5\n"))
+    )
+    with pytest.raises(MeshError, match=r"'camera' 0 .* has 3 numbers on its line; .* declares 1"):
+        read_soup(tmp_path / "b.ply")
+    short = OFF.replace(rows[1], " ".join(rows[1].split()[:2]) + "\n").replace(
+        rows[2], "9 " + rows[2]
+    )
+    (tmp_path / "c.ply").write_text(ply(rows=short))
+    with pytest.raises(MeshError, match=r"'vertex' 1 .* has 2 numbers on its line; .* declares 3"):
+        read_soup(tmp_path / "c.ply")
+    # A row may go over several lines, and several rows on one.
+    (tmp_path / "d.ply").write_text(ply(rows=OFF.replace(" ", "\n")))
+    assert len(read_soup(tmp_path / "d.ply").V) == 4

@@ -176,6 +176,7 @@ def _columns(
     chosen = {name: _indices(_element(elements, name), wanted[name]) for name in wanted}
     stored = elements
     if form == "ascii":
+        _check_lines(elements, body)
         body = _numbers(body, header_lines).view(np.uint8)
         stored = [_as_doubles(element) for element in elements]
     _check_size(stored, body, form)
@@ -266,6 +267,31 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
             if not _is_number(word):
                 raise damaged(f"line {number}, {shown(line)}: {shown(word)} is not a number")
     raise damaged("the body holds a word that is not a number")
+
+
+def _check_lines(elements: list[_Element], body: Bytes) -> None:
+    """Raise if a row without lists is longer or shorter than declared, where each row has a line.
+
+    Numbers are read one after another, so lines that changed places would move all between them.
+    """
+    if not len(body):
+        return
+    space = body <= ord(" ")
+    starts = ~space
+    starts[1:] &= space[:-1]
+    lines = np.flatnonzero(body[:-1] == ord("\n")) + 1
+    words = np.add.reduceat(starts, np.concatenate([[0], lines]), dtype=np.int64)
+    words = words[words > 0]
+    if len(words) != sum(element.count for element in elements):
+        return  # rows may go over several lines
+    for element in elements:
+        own, words = words[: element.count], words[element.count :]
+        wrong = np.flatnonzero(own != len(element.properties))
+        if len(wrong) and all(p.size is None for p in element.properties):
+            raise damaged(
+                f"{element.name!r} {wrong[0]} (counted from 0) has {own[wrong[0]]} numbers on its "
+                f"line; the header declares {len(element.properties)}"
+            )
 
 
 def _is_number(word: str) -> bool:
