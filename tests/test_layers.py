@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_110,
     "mesh": 5_960,
     "linear_algebra": 1_500,
-    "conformal": 6_350,
+    "conformal": 6_390,
     "registry": 950,
     "results": 4_800,
     "running": 7_300,

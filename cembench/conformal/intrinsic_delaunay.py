@@ -29,7 +29,9 @@ MOST_ROUNDS = 1000
 FEW = 0.02
 
 
-def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indices, Real, Real]:
+def intrinsic_delaunay(
+    F: Indices, lengths: Real, weights: Real, bearable: float = 0.0
+) -> tuple[Indices, Real, Real]:
     """Flip edges until all are Delaunay: their opposite angles sum to at most 180 degrees.
 
     Parameters
@@ -40,6 +42,8 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
         Length of the edge opposite to each corner.
     weights : float (m, 3)
         Half the cotangent of the angle at each corner.
+    bearable : float
+        Edges whose weight, half the cotangents' sum, is at least minus this are left as they are.
 
     Returns
     -------
@@ -54,29 +58,47 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
            Computing 81, 2007.
 
     """
-    if _is_delaunay(F, lengths, weights):
-        return F, lengths, weights
-    corners = _Corners(F, lengths, weights)
-    waiting = np.flatnonzero(corners.weight < 0)
-    for _ in range(MOST_ROUNDS):
-        wrong = corners.not_delaunay(waiting)
+    obtuse = np.count_nonzero(weights < -bearable / 2)
+    if obtuse <= FEW * weights.size:
+        wrong = _at_wrong_edges(F, lengths, weights, bearable) if obtuse else np.empty(0, int)
         if not len(wrong):
-            break
-        flipped = corners.sharing_no_triangle(wrong)
-        touched = corners.flip(wrong[flipped])
-        waiting = np.concatenate([wrong[~flipped], touched])
-    mesh_and_lengths = corners.vertex.reshape(-1, 3), corners.length.reshape(-1, 3)
-    return *mesh_and_lengths, corners.weight.reshape(-1, 3)
+            return F, lengths, weights
+        flipped = _flipped_near(wrong, F, lengths, weights, bearable)
+        if flipped is not None:
+            return flipped
+    whole = _Corners(F, lengths, weights, bearable)
+    whole.flip_all()
+    return whole.triangles()
 
 
-def _is_delaunay(F: Indices, lengths: Real, weights: Real) -> bool:
-    """Whether all edges are known to be Delaunay: few angles are obtuse, their edges all right."""
-    obtuse = np.count_nonzero(weights < 0)
-    if not obtuse or obtuse > FEW * weights.size:
-        return not obtuse
-    near = opposite_to_obtuse(F, weights)
-    part = _Corners(F[near], lengths[near], weights[near])
-    return not len(part.not_delaunay(np.flatnonzero(part.weight < 0)))
+def _at_wrong_edges(F: Indices, lengths: Real, weights: Real, bearable: float) -> Indices:
+    """Return the triangles at edges that must be flipped, found from the obtuse angles alone."""
+    near = np.flatnonzero(opposite_to_obtuse(F, weights + bearable / 2))
+    part = _Corners(F[near], lengths[near], weights[near], bearable)
+    wrong = part.not_delaunay(part.obtuse())
+    return np.asarray(near[np.concatenate([wrong, part.twin[wrong]]) // 3])
+
+
+def _flipped_near(
+    wrong: Indices, F: Indices, lengths: Real, weights: Real, bearable: float
+) -> tuple[Indices, Real, Real] | None:
+    """Flip with only the triangles near these at hand; None where flips lead farther away."""
+    inside = np.zeros(int(F.max()) + 1, dtype=bool)
+    inside[F[wrong]] = True
+    inside[F[_with_one_of(inside, F)]] = True
+    near = np.flatnonzero(_with_one_of(inside, F))
+    part = _Corners(F[near], lengths[near], weights[near], bearable)
+    if not part.flip_all(inside):
+        return None
+    F, lengths, weights = F.copy(), lengths.copy(), weights.copy()
+    F[near], lengths[near], weights[near] = part.triangles()
+    return F, lengths, weights
+
+
+def _with_one_of(inside: NDArray[np.bool_], F: Indices) -> NDArray[np.bool_]:
+    """Return a mask (m,) of the triangles with a vertex of these."""
+    first, second, third = inside.take(F).T
+    return np.asarray(first | second | third)
 
 
 def opposite_to_obtuse(F: Indices, weights: Real) -> NDArray[np.bool_]:
@@ -95,7 +117,8 @@ def opposite_to_obtuse(F: Indices, weights: Real) -> NDArray[np.bool_]:
 class _Corners:
     """Data at each corner of each triangle; arrays (3 m,), changed by flips."""
 
-    def __init__(self, F: Indices, lengths: Real, weights: Real) -> None:
+    def __init__(self, F: Indices, lengths: Real, weights: Real, bearable: float) -> None:
+        self._bearable = bearable
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
@@ -103,13 +126,36 @@ class _Corners:
         self._apart = Independence(len(F))
         self._moved_to = np.empty(F.size, dtype=np.int64)
 
+    def triangles(self) -> tuple[Indices, Real, Real]:
+        """Return vertices, lengths and weights (m, 3)."""
+        return self.vertex.reshape(-1, 3), self.length.reshape(-1, 3), self.weight.reshape(-1, 3)
+
+    def obtuse(self) -> Indices:
+        """Return the corners, one at least of every edge that may have to be flipped."""
+        return np.flatnonzero(self.weight < -self._bearable / 2)
+
+    def flip_all(self, inside: NDArray[np.bool_] | None = None) -> bool:
+        """Flip until no edge is wrong; False, and not at the end, at a vertex not `inside`."""
+        waiting = self.obtuse()
+        for _ in range(MOST_ROUNDS):
+            wrong = self.not_delaunay(waiting)
+            if not len(wrong):
+                break
+            flipped = self.sharing_no_triangle(wrong)
+            touched = self.flip(wrong[flipped])
+            if inside is not None and not inside[self.vertex.reshape(-1, 3)[touched // 3]].all():
+                return False
+            waiting = np.concatenate([wrong[~flipped], touched])
+        return True
+
     def not_delaunay(self, corners: Indices) -> Indices:
         """Return the corners whose edge is not Delaunay, the lower one of each edge's two."""
         twins = self.twin.take(corners)
         inside = twins >= 0
         corners, twins = corners[inside], twins[inside]
         one, other = self.weight.take(corners), self.weight.take(twins)
-        wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
+        least = np.maximum(self._bearable, ROUNDING * (np.abs(one) + np.abs(other)))
+        wrong = one + other < -least
         corners, twins = corners[wrong], twins[wrong]
         wrong = corners // 3 != twins // 3  # such an edge cannot be flipped
         lower = np.sort(np.minimum(corners, twins)[wrong], kind="stable")

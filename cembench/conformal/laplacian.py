@@ -98,7 +98,9 @@ def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> scipy.s
     return laplacian_of_weights(F, half_cotangents(V, F), len(V))
 
 
-def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc_array:
+def laplacian(
+    mesh: TriangleMesh, *, delaunay: bool = False, bearable: float = 0.0
+) -> scipy.sparse.csc_array:
     """Return the cotangent Laplacian of a mesh, in the phase "laplacian".
 
     All algorithms share this function.
@@ -110,6 +112,8 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
     delaunay : bool
         Whether to use the intrinsic Delaunay triangulation of the same surface [1]_. Then no weight
         is negative, and harmonic maps obey a discrete maximum principle.
+    bearable : float
+        With `delaunay`, edges whose weight is at least minus this are left as they are.
 
     Returns
     -------
@@ -142,7 +146,7 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
                 lengths[block, k] = np.sqrt(sum(x * x for x in e.T))
         small = mesh.n * SLOTS < 2**31
         F, _, weights = intrinsic_delaunay(
-            mesh.F.astype(np.int32 if small else np.int64), lengths, weights
+            mesh.F.astype(np.int32 if small else np.int64), lengths, weights, bearable
         )
         return laplacian_of_weights(F, weights, mesh.n)
 

@@ -14,9 +14,9 @@ from tests import gallery
 from tests.real_meshes import real_mesh
 
 
-def of(V, F):
+def of(V, F, bearable=0.0):
     lengths = np.linalg.norm(V[F[:, [1, 2, 0]]] - V[F[:, [2, 0, 1]]], axis=2)
-    return own.intrinsic_delaunay(F, lengths, half_cotangents(V, F))
+    return own.intrinsic_delaunay(F, lengths, half_cotangents(V, F), bearable)
 
 
 def area(lengths):
@@ -114,6 +114,53 @@ def _with_one_thin_pair(mesh, wrong):
     tip, one, other = mesh.F[inside]
     V[tip] += (0.9 if wrong else 0.55) * ((V[one] + V[other]) / 2 - V[tip])
     return DiskMesh(V, mesh.F)
+
+
+def _circle_in_a_zigzag(count):
+    """Points on a circle, their triangles in a row, and the centre in one of them."""
+    angle = 2 * np.pi * np.arange(count) / count
+    V = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    rows = []
+    low, high = 0, count - 1
+    while high - low > 1:
+        rows.append((high, low, high - 1) if len(rows) % 2 else (high, low, low + 1))
+        low, high = (low, high - 1) if len(rows) % 2 == 0 else (low + 1, high)
+    F = np.array(rows)
+    areas = np.cross(V[F], V[np.roll(F, -1, axis=1)])[:, :, 2].min(axis=1)
+    a, b, c = F[(middle := np.argmax(areas))]
+    assert areas[middle] > 0
+    new = [[a, b, count], [b, c, count], [c, a, count]]
+    return np.concatenate([V, [[0, 0, 0]]]), np.concatenate([np.delete(F, middle, axis=0), new])
+
+
+def test_flips_that_lead_far_are_all_made(monkeypatch):
+    """The centre is in the circle of every triangle: flips go from one to the next."""
+    disk, (V, F) = flat_disk(3000), _circle_in_a_zigzag(41)
+    V, F = np.concatenate([disk.V, V]), np.concatenate([disk.F, F + disk.n])
+    assert 0 < (half_cotangents(V, F) < 0).mean() < own.FEW
+    values = of(V, F)
+    assert (values[0] == len(V) - 1).any(axis=1).sum() == 41
+    monkeypatch.setattr(own, "FEW", 0.0)
+    for near, whole in zip(values, of(V, F), strict=True):
+        np.testing.assert_array_equal(near, whole)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_edges_whose_weight_is_bearable_stay(monkeypatch, share):
+    monkeypatch.setattr(own, "FEW", share)
+    mesh = hemi_ellipsoid(3000, z=6.0)
+    least = [_least_inner_weight(*of(mesh.V, mesh.F, bearable)) for bearable in (0.0, 0.1, 0.2, 9)]
+    assert least[0] >= -1e-9
+    assert -0.1 <= least[1] < -0.05
+    assert -0.2 <= least[2] < -0.1
+    assert of(mesh.V, mesh.F, 9)[0] is mesh.F
+
+
+def _least_inner_weight(F, lengths, weights):
+    """Return the least sum of the weights on both sides of an edge."""
+    ends = np.sort(np.stack([F[:, [1, 2, 0]], F[:, [2, 0, 1]]], axis=2).reshape(-1, 2))
+    _, edge, sides = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
+    return np.bincount(edge.ravel(), weights.ravel())[sides == 2].min()
 
 
 @pytest.mark.parametrize("wrong", [False, True])
