@@ -1,10 +1,9 @@
 """Typical seconds and memory of the built-in algorithms, for estimates without records.
 
 The seconds are those of a call on 10,000 triangles and their growth, under both linear-algebra
-policies. The figures of the paper's algorithms are fits through the runs in ``reports/standard``
-and ``reports/paper``; the others are CPU seconds measured in one sitting, on surfaces of 5,600 to
-34,000 triangles. Other machines differ by a factor: a record of the same algorithm has priority
-over this table.
+policies. The figures of the paper's algorithms are fits through runs over its models; the others
+are CPU seconds measured in one sitting, on surfaces of 5,600 to 34,000 triangles. Other machines
+differ by a factor: a record of the same algorithm has priority over this table.
 """
 
 from __future__ import annotations
