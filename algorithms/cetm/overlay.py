@@ -239,7 +239,8 @@ def _triangles(cell: Sequence[int], V: Real, uv: Complex) -> list[tuple[int, ...
         x, y, w = (uv[F[:, j]] for j in range(3))
         space = np.linalg.norm(np.cross(b - a, c - a), axis=1)
         plane = np.imag(np.conj(y - x) * (w - x))
-        return float(min((space / space.sum()).min(), (plane / abs(plane.sum())).min()))
+        areas = space / (space.sum() or 1), plane / (abs(plane.sum()) or 1)
+        return float(min(share.min() for share in areas))
 
     return fan(0) if len(cell) == 3 else fan(max(range(len(cell)), key=least))
 

@@ -125,7 +125,7 @@ class Triangulation:
         own = self.log_length.reshape(-1, 3)[t] + (corner + np.roll(corner, -1, axis=1)) / 2
         k = np.arange(len(h))
         e, a, b = (own[k, (c + d) % 3] for d in range(3))
-        with np.errstate(over="ignore"):
+        with np.errstate(over="ignore", invalid="ignore"):  # not a number is no reason to flip
             return np.asarray((np.exp(a - b) + np.exp(b - a) - np.exp(2 * e - a - b)) / 2)
 
     def _flip(self, h: Indices, moved: Indices, *, flat: bool) -> None:

@@ -142,3 +142,9 @@ def test_needles_whose_flips_go_round_in_circles_are_refused_in_a_moment(number)
     with pytest.raises(AlgorithmFailed, match=r"still being flipped after (\d+) rounds") as raised:
         cetm_flips(mesh, last_resort=False)
     assert int(re.findall(r"\d+", str(raised.value))[0]) < 1000 + 50 * mesh.m
+
+
+def test_scale_factors_beyond_all_numbers_are_no_warning():
+    T, n = doubled_triangulation(hemi_ellipsoid(200))
+    T.make_delaunay(np.where(np.arange(n) % 2, 1500.0, -1500.0))
+    assert_glued(T)
