@@ -45,6 +45,8 @@ NAMES = {name: spelling.split()[0] for name, spelling in USUAL.items()}
 NONE: Mapping[str, Any] = MappingProxyType({})
 #: What the values of options are called in the help.
 _METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
+#: From here on an upper bound is no help to a reader; the function still refuses what is above it.
+MANY = 2**31
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
 Call = partial[Any]
 
@@ -156,7 +158,8 @@ def _option_of(
         repeatable = " Comma-separated."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if kind in (int, float) and argument.range is not None:
-        more |= {"min": argument.range.least, "max": argument.range.most}
+        least, most = argument.range.least, argument.range.most
+        more |= {"min": least, "max": most if most < MANY else None}
     if kind is float:
         more["callback"] = finite
     is_list = not _is_single(argument)
