@@ -360,7 +360,7 @@ def benchmark(
         Show this algorithm's speedup over the others (default: cem).
     cluster : str, optional
         Measure on local:N workers, on those of tls://HOST:PORT, or on
-        slurm:partition=cpu,cores=16,machines=10: see docs/cluster.md. In Python also a
+        slurm:KEY=VALUE,...: see docs/cluster.md. In Python also a
         ``distributed.Client``.
     same_environment : bool
         Of a cluster, leave out machines with other software.

@@ -46,7 +46,9 @@ NONE: Mapping[str, Any] = MappingProxyType({})
 #: What the values of options are called in the help.
 _METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
 #: From here on an upper bound is no help to a reader; the function still refuses what is above it.
-MANY = 2**31
+MANY = 1_000_000
+#: Choices with more characters than this are listed in the help, not as the value's name.
+LONG = 16
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
 Call = partial[Any]
 
@@ -156,6 +158,8 @@ def _option_of(
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
     if _is_split(argument):
         repeatable = " Comma-separated."
+    elif len(allowed := ", ".join(argument.choices or ())) > LONG:
+        metavar, repeatable = metavar or "NAME", f" One of {allowed}."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if kind in (int, float) and argument.range is not None:
         least, most = argument.range.least, argument.range.most
