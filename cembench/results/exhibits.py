@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any, Self
 
@@ -133,11 +134,7 @@ def place_of(run: Path, name: str, file: str = "") -> Path:
 def write_exhibit(run: Path, exhibit: Exhibit) -> Path:
     """Write the description of an exhibit whose pictures are in its folder; return its path.
 
-    Raises
-    ------
-    RecordError
-        A picture that it names does not exist.
-
+    Raises RecordError if a picture that it names does not exist.
     """
     folder = exhibit_folder(run, exhibit.name)
     for picture in exhibit.pictures:
@@ -166,8 +163,8 @@ def read_exhibits(run: Path) -> list[Exhibit]:
 def copy_exhibits(run: Path, into: Path) -> None:
     """Copy the exhibits of a run, with their pictures, to another that does not have them.
 
-    Where it has a different exhibit of that name, as two runs over sets of surfaces have, the copy
-    is numbered.
+    Where it has a different exhibit of that name, the copy is numbered; tables of the same columns
+    without pictures, as the lists of the surfaces of two runs, become one.
 
     Raises
     ------
@@ -178,6 +175,10 @@ def copy_exhibits(run: Path, into: Path) -> None:
     held = {one.name: one for one in read_exhibits(into)}
     for exhibit in read_exhibits(run):
         copy, number = exhibit, 1
+        if both := _joined(held.get(exhibit.name), exhibit):
+            held[exhibit.name] = both
+            write_model(place_of(into, exhibit.name) / _DESCRIPTION, both)
+            continue
         while copy.name in held and held[copy.name] != copy:
             number += 1
             names = {"name": f"{exhibit.name}-{number}", "title": f"{exhibit.title} ({number})"}
@@ -191,3 +192,21 @@ def copy_exhibits(run: Path, into: Path) -> None:
                 write_bytes(place_of(into, copy.name, picture.file), read_bytes(file, run))
         write_model(folder / _DESCRIPTION, copy)
         held[copy.name] = copy
+
+
+def _joined(one: Exhibit | None, other: Exhibit) -> Exhibit | None:
+    """Return two exhibits as one if they are tables of the same columns, and nothing else."""
+    kinds = [x and (x.title, *((t.title, t.columns) for t in x.tables)) for x in (one, other)]
+    if not one or kinds[0] != kinds[1] or one.pictures or other.pictures or not one.tables:
+        return None
+
+    def union(*parts: Iterable[Any]) -> Any:
+        return tuple(dict.fromkeys(chain(*parts)))
+
+    tables = tuple(
+        a.model_copy(update={"rows": union(a.rows, b.rows), "notes": union(a.notes, b.notes)})
+        for a, b in zip(one.tables, other.tables, strict=True)
+    )
+    text = "\n\n".join(union(one.text.split("\n\n"), other.text.split("\n\n")))
+    made = "; ".join(union(one.command.split("; "), other.command.split("; ")))
+    return one.model_copy(update={"tables": tables, "text": text, "command": made, "facts": {}})

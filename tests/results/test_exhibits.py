@@ -69,3 +69,21 @@ def test_exhibits_are_copied_with_their_pictures_and_numbered_where_names_meet(t
     (first / "exhibits/koebe/steps.png").unlink()
     copy_exhibits(first, tmp_path / "third")  # the report says that the picture is gone
     assert read_exhibits(tmp_path / "third") == [exhibit()]
+
+
+def test_lists_without_pictures_become_one(tmp_path):
+    def listed(run, *rows):
+        table = ExhibitTable(title="Surfaces", columns=("surface", "vertices"), rows=rows)
+        about = {"text": f"{run}: {len(rows)} surfaces.", "command": f"cembench run {run}"}
+        one = exhibit("set").model_copy(update={"pictures": (), "tables": (table,), **about})
+        write_exhibit(tmp_path / run, one)
+        return tmp_path / run
+
+    runs = listed("a", ("face", 9), ("head", 8)), listed("b", ("head", 8), ("hand", 7))
+    for run in (*runs, *runs):  # the second time nothing is new
+        copy_exhibits(run, tmp_path / "into")
+    (both,) = read_exhibits(tmp_path / "into")
+    assert both.tables[0].rows == (("face", 9), ("head", 8), ("hand", 7))
+    assert both.text == "a: 2 surfaces.\n\nb: 2 surfaces."
+    assert both.command == "cembench run a; cembench run b"
+    assert both.facts == {}
