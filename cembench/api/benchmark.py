@@ -327,7 +327,7 @@ def benchmark(
         Measure until the half-width of the 95 % intervals, of the seconds and of their ratios to
         the reference, is at most this share, e.g. 5% or 0.05 (default: 5%).
     rounds : int, optional
-        Fixed number of rounds, instead of `precision`; fewer than 6 give no interval.
+        Fixed number of rounds for every cell; fewer than 6 give no interval.
     max_rounds : int
         Maximum number of rounds with `precision`.
     budget : float or str, optional
