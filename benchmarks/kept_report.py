@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import csv
-import gzip
 import io
+import lzma
 import re
 import shutil
 from collections.abc import Sequence
@@ -17,9 +17,11 @@ from cembench.core.atomic import write_bytes, write_text
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
 #: The records of a report, and of one that is kept: text of numbers packs to a third.
-RECORDS, PACKED = "records.csv", "records.csv.gz"
+RECORDS, PACKED = "records.csv", "records.csv.xz"
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 8, re.compile(r"-?\d+\.\d{7,}(?:e[+-]?\d+)?")
+#: Hashes, of which a quarter is kept: the first digits name them, and hashes do not pack.
+HASH = re.compile(r"\b([0-9a-f]{16})[0-9a-f]{48}\b")
 #: Links to what is left out, and the forms of a figure besides its picture: the records hold the
 #: values that it was drawn from.
 LINKS = re.compile(r"\[([^\]]*)\]\((?:records\.md#|pages/)[^)]*\)")
@@ -37,7 +39,7 @@ def records_of(report: Path) -> list[dict[str, str]]:
     """Return the records of a report, a kept one or not, as rows of text."""
     csv.field_size_limit(2**31 - 1)
     packed = report / PACKED
-    data = gzip.decompress(packed.read_bytes()) if packed.is_file() else b""
+    data = lzma.decompress(packed.read_bytes()) if packed.is_file() else b""
     text = data.decode() or (report / RECORDS).read_text(encoding="utf-8")
     return list(csv.DictReader(io.StringIO(text)))
 
@@ -55,11 +57,12 @@ def short_records(text: str) -> str:
 
 
 def rounded(text: str) -> str:
-    """Return text with all numbers in it rounded.
+    """Return text with all numbers in it rounded, and hashes shortened.
 
     >>> rounded("[0.12345678901234567, 1.5e-12, 1.23456789012e-05]")
     '[0.12345679, 1.5e-12, 1.2345679e-05]'
     """
+    text = HASH.sub(r"\1", text)
     return LONG.sub(lambda number: f"{float(number[0]):.{DIGITS}g}", text)
 
 
@@ -72,9 +75,9 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
 
     Pages and pictures of every surface, and every figure in three forms, make a clone heavy;
     `cembench report` makes them again from a run. Records are kept without their histories and
-    phases, with eight digits, packed. The folder is replaced if it holds a report. A folder of
-    `hide`, one that others do not have, is named by its last part. `run` is the command that
-    measured it, for `make refresh`.
+    phases, packed: eight digits of numbers, sixteen of hashes. The folder is replaced if it holds
+    a report. A folder of `hide`, one that others do not have, is named by its last part. `run` is
+    the command that measured it, for `make refresh`.
     """
     folder = folder.absolute()
     name = folder.relative_to(ROOT) if folder.is_relative_to(ROOT) else folder
@@ -90,7 +93,7 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
     write_text(folder / "report.md", page)
     for path in hide:
         records = records.replace(str(path), path.name)
-    write_bytes(folder / PACKED, gzip.compress(records.encode(), mtime=0))
+    write_bytes(folder / PACKED, lzma.compress(records.encode(), preset=9 | lzma.PRESET_EXTREME))
     for file in folder.rglob("*"):
         if file.suffix in (".md", ".csv"):
             text = shown = file.read_text(encoding="utf-8")

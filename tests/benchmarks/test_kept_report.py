@@ -15,7 +15,7 @@ def test_links_to_what_is_left_out_become_plain_text():
     forms = "All. ([SVG](figures/a.svg), [PDF](figures/a.pdf), [data](figures/a.csv))\n"
     assert shortened(forms, "reports/x") == "All.\n"
     records = "a line of [records.csv](records.csv)"
-    assert shortened(records, "reports/x") == "a line of [records.csv](records.csv.gz)"
+    assert shortened(records, "reports/x") == "a line of [records.csv](records.csv.xz)"
     made = "Made by `cembench report results/x -o elsewhere`."
     assert shortened(made, "reports/x") == "Made by `cembench report results/x -o reports/x`."
 
@@ -27,7 +27,8 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
         (report / name).write_text(name)
     page = "![A](figures/a.png) ([SVG](figures/a.svg)) [CSV](tables/t.csv) [a](pages/surface-a.md)"
     (report / "report.md").write_text(page)
-    (report / "records.csv").write_text("mesh,phases,seconds\na,{},1.5\nb,{},0.123456789012\n")
+    lines = "mesh,phases,seconds", f"{'0f' * 32},{{}},1.5", "b,{},0.123456789012"
+    (report / "records.csv").write_text("\n".join(lines))
     kept.mkdir()
     (kept / "old.png").write_text("old")
     with pytest.raises(SystemExit, match="holds no report to replace"):
@@ -37,12 +38,12 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     kept_report(report, kept, hide=[Path("/home/me/meshes")])
     assert (kept / "tables/t.csv").read_text() == "meshes/a.obj"
     files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
-    assert files == {"report.md", "records.csv.gz", "figures/a.png", "tables/t.csv"}
-    rows = [{"mesh": "a", "seconds": "1.5"}, {"mesh": "b", "seconds": "0.12345679"}]
+    assert files == {"report.md", "records.csv.xz", "figures/a.png", "tables/t.csv"}
+    rows = [{"mesh": "0f" * 8, "seconds": "1.5"}, {"mesh": "b", "seconds": "0.12345679"}]
     assert records_of(kept) == rows
-    first = (kept / "records.csv.gz").read_bytes()
+    first = (kept / "records.csv.xz").read_bytes()
     kept_report(report, kept)
-    assert (kept / "records.csv.gz").read_bytes() == first
+    assert (kept / "records.csv.xz").read_bytes() == first
 
 
 @pytest.mark.parametrize("report", ["paper", "standard", "real"])
