@@ -157,6 +157,11 @@ def test_symbols_of_the_paper_have_subscripts_and_code_does_not(tmp_path):
     ) in path.read_text()
 
 
+def test_no_line_ends_before_a_per_cent(tmp_path):
+    path = write_html(report_of(Text("16 % of 184, `5 %`")), tmp_path)
+    assert "<p>16\u00a0% of 184, <code>5 %</code></p>" in path.read_text()
+
+
 def test_a_report_without_plots_is_small(tmp_path):
     path = write_html(report_of(Text("See `cembench show`.")), tmp_path)
     assert path == tmp_path / "index.html"

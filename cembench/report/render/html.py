@@ -476,6 +476,7 @@ def _prose(words: str) -> Markup:
 
 def _symbols(words: str) -> Markup:
     symbol = re.compile(r"\b([A-Za-z])_([A-Z]+)\b")
+    words = re.sub(r"(?<=\d) (?=%)", "\u00a0", words)  # no line ends before a per cent
     text = re.sub(r"(https://[^\s<>]*[\w/])", r'<a href="\1">\1</a>', str(escape(words)))
     return Markup(symbol.sub(r"<i>\1</i><sub>\2</sub>", text))
 
