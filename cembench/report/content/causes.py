@@ -39,7 +39,7 @@ def causes() -> Mapping[str, Cause]:
 
 
 def with_causes(evidence: Evidence, frame: pd.DataFrame) -> pd.DataFrame:
-    """Return a part of a run's frame with what makes its surfaces hard.
+    """Return rows of a run's frame with the causes that make their surfaces hard to map.
 
     The columns are those of :class:`~cembench.report.difficulty.Shape`, `boundary_crowding`,
     `causes` (lists of names, empty for none), `best_error` (the smallest mean angle error on the

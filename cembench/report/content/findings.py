@@ -175,10 +175,10 @@ def findings(
 ) -> Findings:
     """Return the head of a report.
 
-    With `claims`, those of the paper, it opens with the paper's own claim and all verdicts.
-    Without, the run is over the user's own surfaces: it has their table. Then, for maps to the disk
-    under the run's first policy: whose angle errors are the smallest, and who is the fastest of
-    those that are as good.
+    With `claims`, those of the paper, it opens with the paper's own claim and all verdicts; without
+    them, with the table of the user's own surfaces. Then, for maps to the disk under the run's
+    first policy, come whose angle errors are the smallest, and who is the fastest of those that are
+    as good.
     """
     field = field_of(evidence, evidence.policies[0])
     sentences: list[Sentence] = []
