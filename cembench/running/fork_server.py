@@ -51,6 +51,7 @@ class ForkServer:
 
     def __init__(self, environment: Mapping[str, str], backend: str) -> None:
         self.backend = backend
+        self._asked = 0
         self._process = subprocess.Popen(
             [sys.executable, "-m", "cembench.running.fork_server", str(os.getpid()), backend],
             bufsize=0,
@@ -78,21 +79,27 @@ class ForkServer:
         return start
 
     def ask(self, request: object) -> int | None:
-        """Return the server's answer; raise :class:`ServerGoneError` if it is gone."""
+        """Return the server's answer; raise :class:`ServerGoneError` if it is gone.
+
+        A signal may end a request before its answer is read; the next one passes that over.
+        """
         assert self._process.stdin is not None
+        self._asked += 1
         try:
-            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+            self._process.stdin.write(json.dumps([self._asked, request]).encode() + b"\n")
         except BrokenPipeError:
             raise ServerGoneError from None
         return self._answer()
 
     def _answer(self) -> int | None:
         assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            raise ServerGoneError
-        number: int | None = json.loads(line)
-        return number
+        while line := self._process.stdout.readline():
+            with suppress(ValueError):  # the rest of a line of which the beginning was read
+                number, answer = json.loads(line)
+                if number == self._asked:
+                    known: int | None = answer
+                    return known
+        raise ServerGoneError
 
     def close(self) -> None:
         """End the server."""
@@ -144,25 +151,27 @@ class _ForkRequest:
 def _serve() -> _ForkRequest:
     """Answer requests on standard input, one per line; return in every forked process."""
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
-    child = 0
-    _say(None)
+    child, code = 0, None
+    _say(0, None)
     while line := requests.readline():
-        request = json.loads(line)
+        number, request = json.loads(line)
         if request in ("poll", "wait"):
-            pid, status = os.waitpid(child, os.WNOHANG if request == "poll" else 0)
-            _say(os.waitstatus_to_exitcode(status) if pid else None)
+            if code is None:
+                pid, status = os.waitpid(child, os.WNOHANG if request == "poll" else 0)
+                code = os.waitstatus_to_exitcode(status) if pid else None
+            _say(number, code)
             continue
-        child = os.fork()
+        child, code = os.fork(), None
         if not child:
             return _ForkRequest(**request)
         with suppress(OSError):  # already done by the child, or the child has ended
             os.setpgid(child, child)
-        _say(child)
+        _say(number, child)
     os._exit(0)
 
 
-def _say(number: int | None) -> None:
-    os.write(1, json.dumps(number).encode() + b"\n")
+def _say(number: int, answer: int | None) -> None:
+    os.write(1, json.dumps([number, answer]).encode() + b"\n")
 
 
 def _set_up_process(order: _ForkRequest) -> None:

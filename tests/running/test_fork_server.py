@@ -102,6 +102,23 @@ def test_without_its_server_a_process_has_failed_and_the_next_is_measured(timer)
     assert timer.launcher.forks
 
 
+@pytest.mark.parametrize("read", [0, 3])
+def test_a_request_that_a_signal_cut_short_leaves_no_answer_to_the_next(tmp_path, read):
+    """As many bytes of the answer had been read; the process had ended, or had not."""
+    (tmp_path / "log").touch()
+    server = ForkServer(for_measuring(1), "cvxopt")
+    forked = server.forking(tmp_path / "no job")("0" * 32, tmp_path / "log")
+    asks, answers = server._process.stdin, server._process.stdout
+    for _ in range(2):
+        asks.write(b'[0, "poll"]\n')
+        answers.read(read)
+        code = forked.wait()
+        assert code > 0
+        forked.code = None
+    assert forked.wait() == code
+    server.close()
+
+
 def test_without_a_server_processes_are_started(timer, monkeypatch):
     monkeypatch.setattr("cembench.running.launcher.can_fork", lambda threads: False)
     assert timed(timer, "tells-where").cause.endswith("worker.py 1 True [] 0")
