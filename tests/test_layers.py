@@ -79,7 +79,7 @@ BUDGETS = {
     "validation": 2_270,
     "morphing": 1_350,
     "api": 5_050,
-    "commands": 2_860,
+    "commands": 2_880,
 }
 
 

@@ -6,6 +6,8 @@ from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from math import inf
+from time import monotonic
 from typing import Any, Self
 
 from rich.console import Console, Group, RenderableType
@@ -73,7 +75,10 @@ class Remaining:
 
 
 class PlainProgress(Watcher):
-    """Prints a line for each round that begins and each cell that is finished."""
+    """Prints a line for each round that begins and each cell that is finished, or each minute."""
+
+    #: Seconds after which a line says how far it is.
+    EVERY = 60.0
 
     def __init__(self, console: Console, cells: int) -> None:
         self.console = console
@@ -81,6 +86,7 @@ class PlainProgress(Watcher):
         self.finished_cells = 0
         self.remaining = Remaining()
         self._step: Step | None = None
+        self._said_at = monotonic()
 
     def __enter__(self) -> Self:
         return self
@@ -104,12 +110,13 @@ class PlainProgress(Watcher):
         """Print a line if a new round begins."""
         if step != self._step:
             self._step = step
-            left = self.remaining.seconds
-            self._say(str(step) + ("" if left is None else f", about {duration(left)} left"))
+            self._say_left(str(step))
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
-        """Update the estimate of the time left."""
+        """Update the estimate of the time left, and print it after a minute without a line."""
         self.remaining.ended(task.cell.label, rounds_left(step), seconds)
+        if monotonic() - self._said_at > self.EVERY:
+            self._say_left(f"{self.remaining.done} of {self.remaining.processes} processes")
 
     def took(self, task: Task, seconds: float) -> None:
         """Update the estimate of the time left."""
@@ -133,7 +140,12 @@ class PlainProgress(Watcher):
         """Print a remark; a live display stays below it."""
         self.console.print(words, markup=False, soft_wrap=True)
 
+    def _say_left(self, line: str) -> None:
+        left = self.remaining.seconds
+        self._say(line + ("" if left is None else f", about {duration(left)} left"))
+
     def _say(self, line: str) -> None:
+        self._said_at = monotonic()
         self.console.print(line, markup=False, soft_wrap=True)
 
 
@@ -146,6 +158,8 @@ class PlainOnCluster(PlainProgress):
 
 class LiveProgress(PlainProgress):
     """Shows a table of the cells in work, and a bar with the time left."""
+
+    EVERY = inf
 
     def __init__(self, console: Console, cells: int) -> None:
         super().__init__(console, cells)

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from cembench.commands.progress import LiveProgress, Remaining, duration
+from cembench.commands.progress import LiveProgress, PlainProgress, Remaining, duration
 from cembench.running.watcher import Step
 from tests.results.test_comparison import record_of
 
@@ -23,6 +23,18 @@ def test_what_remains_is_judged_by_each_cell_s_last_process():
 @pytest.mark.parametrize(("seconds", "said"), [(40, "40 s"), (600, "10 min"), (7200, "2.0 h")])
 def test_durations_are_said_as_a_person_would(seconds, said):
     assert duration(seconds) == said
+
+
+def test_a_line_says_how_far_it_is_after_a_minute_without_one(monkeypatch):
+    task = SimpleNamespace(cell=record_of([0.25]).cell)
+    console = Console(file=io.StringIO(), width=80)
+    progress = PlainProgress(console, 3)
+    progress.begins(14)
+    progress.starts(task, Step())
+    progress.ends(task, Step(), 2.0)
+    monkeypatch.setattr(PlainProgress, "EVERY", 0.0)
+    progress.ends(task, Step(), 2.0)
+    assert console.file.getvalue().splitlines()[1:] == ["2 of 14 processes, about 24 s left"]
 
 
 def test_the_live_table_shows_cells_and_what_remains():
