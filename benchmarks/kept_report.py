@@ -10,9 +10,13 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
+from PIL import Image
+
 from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section, Table
 from cembench.core.atomic import write_bytes, write_text
+from cembench.drawing.painter import jpeg
 
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
@@ -20,6 +24,8 @@ LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
 RECORDS, PACKED = "records.csv", "records.csv.xz"
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 8, re.compile(r"-?\d+\.\d{7,}(?:e[+-]?\d+)?")
+#: Pictures of more bytes are kept as JPEG, of at most so many pixels across.
+LARGE, WIDTH = 200_000, 1600
 #: Hashes, of which a quarter is kept: the first digits name them, and hashes do not pack.
 HASH = re.compile(r"\b([0-9a-f]{16})[0-9a-f]{48}\b")
 #: Links to what is left out, and the forms of a figure besides its picture: the records hold the
@@ -89,7 +95,14 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         shutil.rmtree(folder)
     for file in set(FILES.findall(page)):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(report / file, folder / file)
+        if file.endswith(".png") and (report / file).stat().st_size > LARGE:
+            small = file.removesuffix(".png") + ".jpg"
+            picture = Image.open(report / file).convert("RGB")
+            picture.thumbnail((WIDTH, 10 * WIDTH))
+            write_bytes(folder / small, jpeg(np.asarray(picture)))
+            page = page.replace(f"]({file})", f"]({small})")
+        else:
+            shutil.copy(report / file, folder / file)
     write_text(folder / "report.md", page)
     for path in hide:
         records = records.replace(str(path), path.name)

@@ -1,4 +1,4 @@
-"""How much faster is CEM? From the tables of kept reports."""
+"""How much faster is CEM? From the tables of a kept report."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from benchmarks.pages import ROOT, Section, Table
 from cembench.results.families import rate_interval
 from cembench.results.multiple_testing import geometric
 
-#: A policy of solving, the table of its averages, and the kept report that README quotes.
+#: The kept report that README quotes.
+KEPT = ROOT / "reports/paper"
+#: A policy of solving, and the table of its averages.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
-REPORTS = {"reuse": ROOT / "reports/standard", "backslash": ROOT / "reports/paper"}
 #: The readings that are shown, by the beginning of their rows.
 MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
 AVERAGES = {MEAN: np.mean, GEOMETRIC: geometric}
@@ -63,15 +64,13 @@ def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
     return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
-def readme_speedups(*, report: Path | None = None) -> Section:
-    """Tabulate how much faster CEM is, from the tables of kept reports and their records.
+def readme_speedups(*, report: Path = KEPT) -> Section:
+    """Tabulate how much faster CEM is, from the tables of a report and its records.
 
     Averages have a 95 % interval over the surfaces (Student's, as in the report's table of
-    certainty) where most cells have the rounds for one. Without a report each
-    policy has the one that README quotes.
+    certainty) where most cells have the rounds for one.
     """
-    folders = {policy: report or kept for policy, kept in REPORTS.items()}
-    files = {policy: folders[policy] / "tables" / file for policy, file in POLICIES.items()}
+    files = {policy: report / "tables" / file for policy, file in POLICIES.items()}
     by_policy = {policy: averages(file) for policy, file in files.items() if file.exists()}
     if not by_policy:
         raise SystemExit(f"{report}/tables holds no {' or '.join(POLICIES.values())}.")
@@ -89,7 +88,7 @@ def readme_speedups(*, report: Path | None = None) -> Section:
             **{
                 policy: [
                     f"{float(averages[reading][f'{name} here']):.1f}"
-                    + interval(folders[policy], name.lower(), policy, reading)
+                    + interval(report, name.lower(), policy, reading)
                     for reading in AVERAGES
                 ]
                 for policy, averages in by_policy.items()

@@ -72,7 +72,7 @@ BUDGETS = {
     "linear_algebra": 1_500,
     "conformal": 6_390,
     "registry": 950,
-    "results": 4_800,
+    "results": 4_810,
     "running": 7_300,
     "drawing": 1_500,
     "report": 7_480,

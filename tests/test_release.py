@@ -64,7 +64,7 @@ def test_every_figure_of_the_paper_is_of_a_kept_record():
     inside = set(re.findall(r"\d+(?:\.\d+)?", QUOTE.sub("", shown)))
     recorded = set(re.findall(r"\d+(?:\.\d+)?", " ".join(words for _, words in quotes)))
     recorded |= set(
-        re.findall(r"(\d+) hold in part", (ROOT / "reports/standard/report.md").read_text())
+        re.findall(r"(\d+) hold in part", (ROOT / "reports/paper/report.md").read_text())
     )
     assert inside <= recorded
 
@@ -95,7 +95,7 @@ def test_pins_have_hashes_and_hold_the_versions_of_the_kept_reports():
     kept = re.findall(r"^([\w-]+==[\d.]+)$", (ROOT / "requirements/kept.in").read_text(), re.M)
     assert len(kept) == 5
     assert all(f"{one} \\" in pins for one in kept)
-    report = (ROOT / "reports/standard/report.md").read_text()
+    report = (ROOT / "reports/paper/report.md").read_text()
     assert all(one.replace("==", " ") in report for one in kept[:3])
 
 

@@ -15,6 +15,7 @@ so it is wrong no more often. For many comparisons in one table see
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
@@ -237,8 +238,14 @@ def verdict_of(interval: Interval | None) -> Verdict:
 
 
 def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
-    """Return the records of the reference algorithm, by :func:`circumstances`."""
-    return {circumstances(r.cell): r for r in records if r.cell.algorithm == algorithm}
+    """Return the records of the reference algorithm, by :func:`circumstances`.
+
+    Of several sets of parameters the one of most records counts.
+    """
+    own = [record for record in records if record.cell.algorithm == algorithm]
+    counts = Counter(str(record.cell.parameters) for record in own)
+    own.sort(key=lambda record: counts[str(record.cell.parameters)])
+    return {circumstances(record.cell): record for record in own}
 
 
 def circumstances(cell: Cell) -> str:

@@ -46,7 +46,7 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     assert (kept / "records.csv.xz").read_bytes() == first
 
 
-@pytest.mark.parametrize("report", ["paper", "standard", "real"])
+@pytest.mark.parametrize("report", ["paper", "real"])
 def test_every_link_of_a_kept_report_leads_somewhere(report):
     folder = ROOT / "reports" / report
     for link in re.findall(r"\]\(([^)#]+)", (folder / "report.md").read_text(encoding="utf-8")):

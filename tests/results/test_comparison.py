@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 
 from cembench.results.comparison import (
+    circumstances,
     compare,
     compare_cpu,
     compare_ratios,
     is_unstable,
+    references,
 )
 from cembench.results.machines import COMPARED, differences
 from cembench.results.records import (
@@ -218,3 +220,14 @@ def test_cpu_seconds_of_a_program_are_not_compared():
     assert compare_cpu(program, theirs) is None
     assert compare_cpu(theirs, program) is None
     assert compare_cpu(ours, theirs).ratio == 1
+
+
+def test_the_reference_is_the_one_whose_parameters_most_cells_have():
+    usual, other = {"inversion": True}, {"inversion": False}
+    records = [
+        record_of([1.0], algorithm="cem", parameters=how, mesh_hash=place)
+        for how, place in ((usual, "a"), (usual, "b"), (other, "b"))
+    ]
+    chosen = references(records, "cem")
+    assert [one.cell.parameters for one in chosen.values()] == [usual, usual]
+    assert references([records[2]], "cem")[circumstances(records[2].cell)] is records[2]
