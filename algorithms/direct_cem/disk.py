@@ -26,7 +26,6 @@ from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.quasi_newton import quasi_newton_minimum
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
-from cembench.linear_algebra.cholesky import keeps_factors
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
@@ -69,26 +68,26 @@ def direct_cem(
     these, which passes a third of the factor (`hessian_products` is then 0); the choice is an
     estimate of operations (`interior_laplacian.py`).
 
-    Decided here: the weights are those of the intrinsic Delaunay triangulation, but under "reuse"
-    edges whose weight is at least -0.1 stay: angles change by parts in a thousand, and a grid keeps
-    the order that makes it cheap. With `delaunay` off they are the cotangents of the mesh's own
-    edges, as in CEM. The recorded energies use the same weights. The start is the harmonic measure
-    of the boundary from the triangle nearest to the mean vertex, or arc length if that has lower
-    energy (`start`). It is moved into the `gauge`, that is, a mean is moved to 0: of the boundary
-    by length, of that triangle, or of the surface by area; from there on Moebius maps are fixed by
-    the start's arcs. The iteration ends when the gradient, whose squared norm is about twice what
-    E_C can still decrease, shows that this is at most `tolerance` times E_C (`stopped`:
-    "gradient"), when only rounding is left ("rounding"), after `max_iterations` ("iterations"), or
-    when too many arcs would fall below a tenth of their initial length ("crowded"; `held_arcs`
-    counts those held). Near its minimum E_C is flat but the angles are not, and harmonic measure
-    has better ones. So the boundary is finally moved back towards it as far as that raises E_C by
-    at most the share `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image;
-    at most `even` more steps, each as dear as all of this, lower the mean angle error with weights
-    that count all triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired
-    as in CEM (`fold_repairs`); `last_resort` makes the map valid in any case.
+    Decided here: the weights are those of the intrinsic Delaunay triangulation, but edges whose
+    weight is at least -0.1 stay: angles change by parts in a thousand, and a grid keeps the order
+    that makes it cheap. With `delaunay` off they are the cotangents of the mesh's own edges, as in
+    CEM. The recorded energies use the same weights. The start is the harmonic measure of the
+    boundary from the triangle nearest to the mean vertex, or arc length if that has lower energy
+    (`start`). It is moved into the `gauge`, that is, a mean is moved to 0: of the boundary by
+    length, of that triangle, or of the surface by area; from there on Moebius maps are fixed by the
+    start's arcs. The iteration ends when the gradient, whose squared norm is about twice what E_C
+    can still decrease, shows that this is at most `tolerance` times E_C (`stopped`: "gradient"),
+    when only rounding is left ("rounding"), after `max_iterations` ("iterations"), or when too many
+    arcs would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those
+    held). Near its minimum E_C is flat but the angles are not, and harmonic measure has better
+    ones. So the boundary is finally moved back towards it as far as that raises E_C by at most the
+    share `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most
+    `even` more steps, each as dear as all of this, lower the mean angle error with weights that
+    count all triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired as in
+    CEM (`fold_repairs`); `last_resort` makes the map valid in any case.
     """
     del even  # the decorator's
-    L = laplacian(mesh, delaunay=delaunay, bearable=BEARABLE if keeps_factors() else 0.0)
+    L = laplacian(mesh, delaunay=delaunay, bearable=BEARABLE)
     with phase("start"):
         middle = gauge_measure(mesh, "triangle", mesh.boundary)
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)

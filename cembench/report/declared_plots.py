@@ -325,9 +325,9 @@ def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Dr
     if points.empty:
         return None
     named = isinstance(points["x"].iloc[0], str)
-    slots = zip(frame["place"], evaluate(spec.x.value, frame), strict=True) if named else ()
+    slots = zip(points["place"], points["x"], strict=True) if named else ()
     places = sorted(dict.fromkeys(slots))
-    ordered = (frame if named else points).sort_values("series", kind="stable")
+    ordered = points.sort_values("series", kind="stable")
     names = list(dict.fromkeys(ordered[spec.series]))
     if spec.kind == "stack":
         total = points.groupby(spec.series)["y"].sum()
