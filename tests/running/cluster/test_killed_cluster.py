@@ -33,7 +33,7 @@ class Cluster:
         address = f"tcp://127.0.0.1:{port}"
         dask = (sys.executable, "-m", "dask")
         worker = (*dask, "worker", address, "--nthreads", "1", "--no-dashboard", "--memory-limit")
-        worker = (*worker, "0", "--death-timeout", "600", "--local-directory", str(cache))
+        worker = (*worker, "0", "--death-timeout", "20", "--local-directory", str(cache))
         self.commands = {
             "scheduler": (*dask, "scheduler", "--port", str(port), "--no-dashboard"),
             "worker-1": worker,
