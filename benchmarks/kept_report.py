@@ -97,7 +97,8 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
         if file.endswith(".png") and (report / file).stat().st_size > LARGE:
             small = file.removesuffix(".png") + ".jpg"
-            picture = Image.open(report / file).convert("RGB")
+            with Image.open(report / file) as opened:
+                picture = opened.convert("RGB")
             picture.thumbnail((WIDTH, 10 * WIDTH))
             write_bytes(folder / small, jpeg(np.asarray(picture)))
             page = page.replace(f"]({file})", f"]({small})")

@@ -75,9 +75,9 @@ class Remaining:
 
 
 class PlainProgress(Watcher):
-    """Prints a line for each round that begins and each cell that is finished, or each minute."""
+    """Prints a line for each round that begins and each cell that ends, or after a minute."""
 
-    #: Seconds after which a line says how far it is.
+    #: Seconds without a line after which one says how far the run is.
     EVERY = 60.0
 
     def __init__(self, console: Console, cells: int) -> None:

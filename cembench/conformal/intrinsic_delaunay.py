@@ -59,8 +59,10 @@ def intrinsic_delaunay(
 
     """
     obtuse = np.count_nonzero(weights < -bearable / 2)
+    if not obtuse:
+        return F, lengths, weights
     if obtuse <= FEW * weights.size:
-        wrong = _at_wrong_edges(F, lengths, weights, bearable) if obtuse else np.empty(0, int)
+        wrong = _at_wrong_edges(F, lengths, weights, bearable)
         if not len(wrong):
             return F, lengths, weights
         flipped = _flipped_near(wrong, F, lengths, weights, bearable)

@@ -113,7 +113,8 @@ def laplacian(
         Whether to use the intrinsic Delaunay triangulation of the same surface [1]_. Then no weight
         is negative, and harmonic maps obey a discrete maximum principle.
     bearable : float
-        With `delaunay`, edges whose weight is at least minus this are left as they are.
+        With `delaunay`, edges whose weight is at least minus this are left as they are, so
+        that a weight may be as low as that.
 
     Returns
     -------

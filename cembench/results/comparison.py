@@ -240,11 +240,11 @@ def verdict_of(interval: Interval | None) -> Verdict:
 def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
     """Return the records of the reference algorithm, by :func:`circumstances`.
 
-    Of several sets of parameters the one of most records counts.
+    Of several sets of parameters the one of most records counts, the first of two alike.
     """
     own = [record for record in records if record.cell.algorithm == algorithm]
-    counts = Counter(str(record.cell.parameters) for record in own)
-    own.sort(key=lambda record: counts[str(record.cell.parameters)])
+    ranked = [how for how, _ in Counter(str(r.cell.parameters) for r in own).most_common()]
+    own.sort(key=lambda record: ranked.index(str(record.cell.parameters)), reverse=True)
     return {circumstances(record.cell): record for record in own}
 
 

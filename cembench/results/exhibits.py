@@ -134,7 +134,11 @@ def place_of(run: Path, name: str, file: str = "") -> Path:
 def write_exhibit(run: Path, exhibit: Exhibit) -> Path:
     """Write the description of an exhibit whose pictures are in its folder; return its path.
 
-    Raises RecordError if a picture that it names does not exist.
+    Raises
+    ------
+    RecordError
+        A picture that it names does not exist.
+
     """
     folder = exhibit_folder(run, exhibit.name)
     for picture in exhibit.pictures:
@@ -174,8 +178,8 @@ def copy_exhibits(run: Path, into: Path) -> None:
     """
     held = {one.name: one for one in read_exhibits(into)}
     for exhibit in read_exhibits(run):
-        copy, number = exhibit, 1
-        if both := _joined(held.get(exhibit.name), exhibit):
+        there, copy, number = held.get(exhibit.name, exhibit), exhibit, 1
+        if there != exhibit and (both := _joined(there, exhibit)):
             held[exhibit.name] = both
             write_model(place_of(into, exhibit.name) / _DESCRIPTION, both)
             continue
@@ -194,10 +198,10 @@ def copy_exhibits(run: Path, into: Path) -> None:
         held[copy.name] = copy
 
 
-def _joined(one: Exhibit | None, other: Exhibit) -> Exhibit | None:
+def _joined(one: Exhibit, other: Exhibit) -> Exhibit | None:
     """Return two exhibits as one if they are tables of the same columns, and nothing else."""
-    kinds = [x and (x.title, *((t.title, t.columns) for t in x.tables)) for x in (one, other)]
-    if not one or kinds[0] != kinds[1] or one.pictures or other.pictures or not one.tables:
+    kinds = [(x.title, x.origin, *((t.title, t.columns) for t in x.tables)) for x in (one, other)]
+    if kinds[0] != kinds[1] or one.pictures or other.pictures or not one.tables:
         return None
 
     def union(*parts: Iterable[Any]) -> Any:

@@ -94,11 +94,10 @@ class ForkServer:
     def _answer(self) -> int | None:
         assert self._process.stdout is not None
         while line := self._process.stdout.readline():
-            with suppress(ValueError):  # the rest of a line of which the beginning was read
-                number, answer = json.loads(line)
-                if number == self._asked:
-                    known: int | None = answer
-                    return known
+            with suppress(ValueError):  # the rest of a line whose beginning was read
+                answer: list[int | None] = json.loads(line)
+                if answer[0] == self._asked:
+                    return answer[1]
         raise ServerGoneError
 
     def close(self) -> None:

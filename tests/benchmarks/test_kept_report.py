@@ -3,10 +3,13 @@
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 from benchmarks.kept_report import LEFT_OUT, kept_report, records_of, rounded, shortened
 from benchmarks.pages import ROOT
+from cembench.report.pictures import size_of
 
 
 def test_links_to_what_is_left_out_become_plain_text():
@@ -44,6 +47,20 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     first = (kept / "records.csv.xz").read_bytes()
     kept_report(report, kept)
     assert (kept / "records.csv.xz").read_bytes() == first
+
+
+def test_a_large_picture_is_kept_as_a_smaller_one_that_the_page_shows(tmp_path):
+    report, kept = tmp_path / "report", tmp_path / "kept"
+    (report / "figures").mkdir(parents=True)
+    noise = np.random.default_rng(1).integers(0, 256, (200, 2000, 3), dtype=np.uint8)
+    Image.fromarray(noise).save(report / "figures/a.png")
+    Image.fromarray(noise[:20, :20]).save(report / "figures/b.png")
+    (report / "report.md").write_text("![A](figures/a.png) ![B](figures/b.png)")
+    (report / "records.csv").write_text("mesh\na\n")
+    kept_report(report, kept)
+    assert (kept / "report.md").read_text() == "![A](figures/a.jpg) ![B](figures/b.png)"
+    assert {file.name for file in (kept / "figures").iterdir()} == {"a.jpg", "b.png"}
+    assert size_of(kept / "figures/a.jpg") == (1600, 160)
 
 
 @pytest.mark.parametrize("report", ["paper", "real"])

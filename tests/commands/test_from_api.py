@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import re
 import sys
 
 import pytest
@@ -40,6 +41,16 @@ def test_options_have_the_defaults_of_the_function(verb):
             argument.default or {},
             list(argument.default or ()) if argument.many else argument.default,
         ), argument.name
+
+
+def test_help_has_no_bound_that_nobody_meets_and_lists_long_choices_in_its_text(cli, monkeypatch):
+    """At 80 columns such a value takes the room of the text, or is broken in two."""
+    monkeypatch.setenv("COLUMNS", "80")
+    holes, run = (" ".join(cli(verb, "--help")[1].split()) for verb in ("holes", "run"))
+    assert re.search(r"--outer N \[x>=0\]", holes)
+    assert re.search(r"--sweeps N \[1<=x<=1000\]", holes)
+    assert re.search(r"--backend NAME ", run)
+    assert "One of cvxopt, cvxopt-metis, superlu, pardiso." in re.sub(r" │ │ ", " ", run)
 
 
 @pytest.mark.parametrize("verb", VERBS)

@@ -53,6 +53,13 @@ def test_the_examples_of_the_page_are_in_the_report(small_run, examples, tmp_pat
     assert "Angle errors by size" in (folder / "report.md").read_text()
 
 
+def test_names_without_a_point_are_neither_in_the_legend_nor_on_the_axis(evidence):
+    where = "valid = \"(algorithm == 'cem') & (surface == 'Chinese Vase')\"\n"
+    plot = declared_plot(evidence, "a", declared(LEAST.replace('"faces"', '"surface"') + where))
+    (series,) = plot.panels[0].series
+    assert (series.name, list(series.x)) == ("CEM", ["Chinese Vase"])
+
+
 def test_points_are_the_figures_of_the_records(evidence):
     plot = declared_plot(evidence, "a", declared(LEAST + "where = \"algorithm == 'cem'\""))
     (series,) = plot.panels[0].series

@@ -231,3 +231,4 @@ def test_the_reference_is_the_one_whose_parameters_most_cells_have():
     chosen = references(records, "cem")
     assert [one.cell.parameters for one in chosen.values()] == [usual, usual]
     assert references([records[2]], "cem")[circumstances(records[2].cell)] is records[2]
+    assert [one is records[1] for one in references(records[1:], "cem").values()] == [True]

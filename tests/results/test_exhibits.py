@@ -87,3 +87,10 @@ def test_lists_without_pictures_become_one(tmp_path):
     assert both.text == "a: 2 surfaces.\n\nb: 2 surfaces."
     assert both.command == "cembench run a; cembench run b"
     assert both.facts == {}
+    kept = read_exhibits(runs[0])
+    copy_exhibits(runs[0], tmp_path / "twice")
+    copy_exhibits(runs[0], tmp_path / "twice")
+    assert read_exhibits(tmp_path / "twice") == kept
+    write_exhibit(runs[1], read_exhibits(runs[1])[0].model_copy(update={"origin": "stand-in"}))
+    copy_exhibits(runs[1], tmp_path / "twice")  # a stand-in's figures do not go among others
+    assert [one.name for one in read_exhibits(tmp_path / "twice")] == ["set", "set-2"]

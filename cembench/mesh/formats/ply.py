@@ -280,7 +280,7 @@ def _check_lines(elements: list[_Element], body: Bytes) -> None:
     starts = ~space
     starts[1:] &= space[:-1]
     lines = np.flatnonzero(body[:-1] == ord("\n")) + 1
-    words = np.add.reduceat(starts, np.concatenate([[0], lines]), dtype=np.int64)
+    words = np.add.reduceat(starts, np.concatenate([[0], lines]), dtype=np.int32)
     words = words[words > 0]
     if len(words) != sum(element.count for element in elements):
         return  # rows may go over several lines
