@@ -21,7 +21,7 @@ from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
-from cembench.conformal.laplacian import laplacian
+from cembench.conformal.laplacian import delaunay_laplacian, laplacian
 from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.quasi_newton import quasi_newton_minimum
 from cembench.core.clock import phase
@@ -37,9 +37,9 @@ _Minimised = tuple[CircleDomain, str, Minimum, Callable[[Complex], Complex]]
 #: Arc length is no better a start than harmonic measure if its estimated energy is so many times
 #: the other one's, which is known.
 SURELY_MORE = 2
-#: Edges with a weight of at least minus this are not flipped. Diagonals of a grid's squares mostly
-#: have weights just below 0, and a grid keeps the order that makes its elimination cheap.
-BEARABLE = 0.1
+#: Where flips change more than this share of the triangles, the interior is ordered by position.
+#: So it is on grids of heights, which lose what made minimum degree cheap; scans change by less.
+MANY_FLIPS = 0.2
 
 
 @algorithm("direct-cem", title="Direct CEM", target="disk", source="This suite: docs/direct_cem.md")
@@ -68,10 +68,9 @@ def direct_cem(
     these, which passes a third of the factor (`hessian_products` is then 0); the choice is an
     estimate of operations (`interior_laplacian.py`).
 
-    Decided here: the weights are those of the intrinsic Delaunay triangulation, but edges whose
-    weight is at least -0.1 stay: angles change by parts in a thousand, and a grid keeps the order
-    that makes it cheap. With `delaunay` off they are the cotangents of the mesh's own edges, as in
-    CEM. The recorded energies use the same weights. The start is the harmonic measure of the
+    Decided here: the weights are those of the intrinsic Delaunay triangulation, none of which is
+    negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
+    recorded energies use the same weights. The start is the harmonic measure of the
     boundary from the triangle nearest to the mean vertex, or arc length if that has lower energy
     (`start`). It is moved into the `gauge`, that is, a mean is moved to 0: of the boundary by
     length, of that triangle, or of the surface by area; from there on Moebius maps are fixed by the
@@ -87,14 +86,15 @@ def direct_cem(
     CEM (`fold_repairs`); `last_resort` makes the map valid in any case.
     """
     del even  # the decorator's
-    L = laplacian(mesh, delaunay=delaunay, bearable=BEARABLE)
+    L, flipped = delaunay_laplacian(mesh) if delaunay else (laplacian(mesh), 0.0)
     with phase("start"):
         middle = gauge_measure(mesh, "triangle", mesh.boundary)
         centred = middle if gauge == "triangle" else gauge_measure(mesh, gauge, mesh.boundary)
         measures = np.stack([middle, centred], axis=1)
     until = {"tolerance": tolerance, "max_iterations": max_iterations}
     own_gauge = gauge == "triangle"
-    solved = _by_solves(mesh, L, measures, own_gauge, **until)
+    many = flipped > MANY_FLIPS
+    solved = _by_solves(mesh, L, measures, own_gauge, by_position=many, **until)
     start, begun, minimum, extended = solved or _by_factor(mesh, L, measures, own_gauge, **until)
     energies = minimum.energies
     share = _share(back, energies) if begun == "harmonic measure" else 0.0
@@ -129,12 +129,18 @@ def _by_factor(
 
 
 def _by_solves(
-    mesh: DiskMesh, L: scipy.sparse.csc_array, measures: Real, own_gauge: bool, **until: Any
+    mesh: DiskMesh,
+    L: scipy.sparse.csc_array,
+    measures: Real,
+    own_gauge: bool,
+    *,
+    by_position: bool,
+    **until: Any,
 ) -> _Minimised | None:
     """Minimise with the interior factored alone; None where that is dearer or does not do."""
     if not solves_pay(len(mesh.interior), len(mesh.boundary)):
         return None
-    interior = InteriorLaplacian(mesh, L, mesh.boundary, measures)
+    interior = InteriorLaplacian(mesh, L, mesh.boundary, measures, by_position=by_position)
     seen, weights = interior.swept.T
     arcs, begun = _starts(mesh, seen), "harmonic measure"
     start = in_gauge(CircleDomain.of_arcs(arcs[begun]), weights)

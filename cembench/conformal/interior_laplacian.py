@@ -83,6 +83,8 @@ class InteriorLaplacian:
         Its boundary, in the order wanted.
     measure : float (n, k)
         What :attr:`swept` is the harmonic measure of.
+    by_position : bool
+        Order the rows by the vertices' positions instead of by minimum degree.
 
     Attributes
     ----------
@@ -104,6 +106,8 @@ class InteriorLaplacian:
         L: scipy.sparse.csc_array,
         boundary: NDArray[np.int64],
         measure: Real,
+        *,
+        by_position: bool = False,
     ) -> None:
         self.interior, self.boundary = mesh.interior, boundary
         with phase("assembly"):
@@ -116,7 +120,8 @@ class InteriorLaplacian:
             some, few, near = _sparse_columns(inside, L_bi)
             self._L_bn = L_bi[:, near]
             self._L_nb = scipy.sparse.csr_array(self._L_bn.T)
-        factor = Cholesky(own, lower=True)
+        points = mesh.V[self.interior] if by_position else None
+        factor = Cholesky(own, lower=True, points=points)
         self._near = factor.among(near)
         self._maps: list[tuple[Complex, Complex]] = []
         self.swept = measure[boundary]

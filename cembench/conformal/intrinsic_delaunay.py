@@ -29,9 +29,7 @@ MOST_ROUNDS = 1000
 FEW = 0.02
 
 
-def intrinsic_delaunay(
-    F: Indices, lengths: Real, weights: Real, bearable: float = 0.0
-) -> tuple[Indices, Real, Real]:
+def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indices, Real, Real]:
     """Flip edges until all are Delaunay: their opposite angles sum to at most 180 degrees.
 
     Parameters
@@ -42,8 +40,6 @@ def intrinsic_delaunay(
         Length of the edge opposite to each corner.
     weights : float (m, 3)
         Half the cotangent of the angle at each corner.
-    bearable : float
-        Edges whose weight, half the cotangents' sum, is at least minus this are left as they are.
 
     Returns
     -------
@@ -58,38 +54,38 @@ def intrinsic_delaunay(
            Computing 81, 2007.
 
     """
-    obtuse = np.count_nonzero(weights < -bearable / 2)
+    obtuse = np.count_nonzero(weights < 0)
     if not obtuse:
         return F, lengths, weights
     if obtuse <= FEW * weights.size:
-        wrong = _at_wrong_edges(F, lengths, weights, bearable)
+        wrong = _at_wrong_edges(F, lengths, weights)
         if not len(wrong):
             return F, lengths, weights
-        flipped = _flipped_near(wrong, F, lengths, weights, bearable)
+        flipped = _flipped_near(wrong, F, lengths, weights)
         if flipped is not None:
             return flipped
-    whole = _Corners(F, lengths, weights, bearable)
+    whole = _Corners(F, lengths, weights)
     whole.flip_all()
     return whole.triangles()
 
 
-def _at_wrong_edges(F: Indices, lengths: Real, weights: Real, bearable: float) -> Indices:
+def _at_wrong_edges(F: Indices, lengths: Real, weights: Real) -> Indices:
     """Return the triangles at edges that must be flipped, found from the obtuse angles alone."""
-    near = np.flatnonzero(opposite_to_obtuse(F, weights + bearable / 2))
-    part = _Corners(F[near], lengths[near], weights[near], bearable)
+    near = np.flatnonzero(opposite_to_obtuse(F, weights))
+    part = _Corners(F[near], lengths[near], weights[near])
     wrong = part.not_delaunay(part.obtuse())
     return np.asarray(near[np.concatenate([wrong, part.twin[wrong]]) // 3])
 
 
 def _flipped_near(
-    wrong: Indices, F: Indices, lengths: Real, weights: Real, bearable: float
+    wrong: Indices, F: Indices, lengths: Real, weights: Real
 ) -> tuple[Indices, Real, Real] | None:
     """Flip with only the triangles near these at hand; None where flips lead farther away."""
     inside = np.zeros(int(F.max()) + 1, dtype=bool)
     inside[F[wrong]] = True
     inside[F[_with_one_of(inside, F)]] = True
     near = np.flatnonzero(_with_one_of(inside, F))
-    part = _Corners(F[near], lengths[near], weights[near], bearable)
+    part = _Corners(F[near], lengths[near], weights[near])
     if not part.flip_all(inside):
         return None
     F, lengths, weights = F.copy(), lengths.copy(), weights.copy()
@@ -119,8 +115,7 @@ def opposite_to_obtuse(F: Indices, weights: Real) -> NDArray[np.bool_]:
 class _Corners:
     """Data at each corner of each triangle; arrays (3 m,), changed by flips."""
 
-    def __init__(self, F: Indices, lengths: Real, weights: Real, bearable: float) -> None:
-        self._bearable = bearable
+    def __init__(self, F: Indices, lengths: Real, weights: Real) -> None:
         self.vertex: Indices = F.flatten()
         self.length: Real = lengths.flatten()
         self.weight: Real = weights.flatten()
@@ -134,7 +129,7 @@ class _Corners:
 
     def obtuse(self) -> Indices:
         """Return the corners, one at least of every edge that may have to be flipped."""
-        return np.flatnonzero(self.weight < -self._bearable / 2)
+        return np.flatnonzero(self.weight < 0)
 
     def flip_all(self, inside: NDArray[np.bool_] | None = None) -> bool:
         """Flip until no edge is wrong; False, and not at the end, at a vertex not `inside`."""
@@ -156,8 +151,7 @@ class _Corners:
         inside = twins >= 0
         corners, twins = corners[inside], twins[inside]
         one, other = self.weight.take(corners), self.weight.take(twins)
-        least = np.maximum(self._bearable, ROUNDING * (np.abs(one) + np.abs(other)))
-        wrong = one + other < -least
+        wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
         corners, twins = corners[wrong], twins[wrong]
         wrong = corners // 3 != twins // 3  # such an edge cannot be flipped
         lower = np.sort(np.minimum(corners, twins)[wrong], kind="stable")

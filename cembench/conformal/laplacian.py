@@ -98,9 +98,7 @@ def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> scipy.s
     return laplacian_of_weights(F, half_cotangents(V, F), len(V))
 
 
-def laplacian(
-    mesh: TriangleMesh, *, delaunay: bool = False, bearable: float = 0.0
-) -> scipy.sparse.csc_array:
+def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc_array:
     """Return the cotangent Laplacian of a mesh, in the phase "laplacian".
 
     All algorithms share this function.
@@ -112,9 +110,6 @@ def laplacian(
     delaunay : bool
         Whether to use the intrinsic Delaunay triangulation of the same surface [1]_. Then no weight
         is negative, and harmonic maps obey a discrete maximum principle.
-    bearable : float
-        With `delaunay`, edges whose weight is at least minus this are left as they are, so
-        that a weight may be as low as that.
 
     Returns
     -------
@@ -135,9 +130,18 @@ def laplacian(
     True
 
     """
+    if delaunay:
+        return delaunay_laplacian(mesh)[0]
     with phase("laplacian"):
-        if not delaunay:
-            return cotangent_laplacian(mesh.V, mesh.F)
+        return cotangent_laplacian(mesh.V, mesh.F)
+
+
+def delaunay_laplacian(mesh: TriangleMesh) -> tuple[scipy.sparse.csc_array, float]:
+    """Return the Laplacian (n, n) of the intrinsic Delaunay triangulation of a mesh.
+
+    And the share of the mesh's triangles that are not in this triangulation.
+    """
+    with phase("laplacian"):
         lengths, weights = np.empty((mesh.m, 3)), np.empty((mesh.m, 3))
         for block in blocks(mesh.m):
             edges = _opposite_edges(mesh.V, mesh.F[block])
@@ -146,10 +150,10 @@ def laplacian(
             for k, e in enumerate(edges):
                 lengths[block, k] = np.sqrt(sum(x * x for x in e.T))
         small = mesh.n * SLOTS < 2**31
-        F, _, weights = intrinsic_delaunay(
-            mesh.F.astype(np.int32 if small else np.int64), lengths, weights, bearable
-        )
-        return laplacian_of_weights(F, weights, mesh.n)
+        before: NDArray[np.int64] = mesh.F.astype(np.int32 if small else np.int64)
+        F, _, weights = intrinsic_delaunay(before, lengths, weights)
+        changed = 0 if F is before else np.count_nonzero((before != F).any(axis=1))
+        return laplacian_of_weights(F, weights, mesh.n), changed / mesh.m
 
 
 def by_rows(L: scipy.sparse.csc_array) -> scipy.sparse.csr_array:

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, Literal, Protocol, get_args
+from typing import TYPE_CHECKING, Any, Literal, Protocol, get_args
 
 import numpy as np
 import scipy
@@ -30,6 +30,9 @@ from cembench.linear_algebra.backends import (
 from cembench.linear_algebra.lower_triangle import both_triangles
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.work import count_columns
+
+if TYPE_CHECKING:
+    from cembench.linear_algebra.cholmod import Order
 
 Solves = Literal["reuse", "backslash"]
 
@@ -175,7 +178,11 @@ class Cholesky:
         A holds its lower triangle alone, each column from top to bottom.
     like : Cholesky, optional
         Order the rows as in that factorisation of another matrix of the same order, whose pattern
-        is nearly the same; not with a leading block. CHOLMOD does, other libraries order again.
+        is nearly the same. CHOLMOD does, other libraries order again.
+    points : float (n, 3), optional
+        Positions on a surface, of the vertices that the rows are for. The default back end then
+        orders the rows by nested dissection of these, where minimum degree is slow: for a grid
+        whose diagonals run either way. Neither this nor `like` goes with a leading block.
 
     Raises
     ------
@@ -200,15 +207,16 @@ class Cholesky:
         leading: int | None = None,
         lower: bool = False,
         like: Cholesky | None = None,
+        points: NDArray[np.float64] | None = None,
     ) -> None:
-        if like is not None and leading is not None:
-            raise ValueError("like needs a matrix without a leading block")
+        if leading is not None and not (like is None and points is None):
+            raise ValueError("like and points need a matrix without a leading block")
         self._given, self._lower = scipy.sparse.csc_array(A), lower
         self._leading = leading
         self._how = _current.get()
         self._kept: _Factor | None = None
         if self._how.solves == "reuse":
-            order = like._kept.order if like is not None and like._kept is not None else None
+            order = _known_order(self._how.backend, like, points)
             self._kept = _factor(self._how.backend, self._read, leading, order)
 
     @property
@@ -404,13 +412,27 @@ def _count(b: NDArray[Any], share: float = 1.0) -> None:
     count_columns(share * columns * (2 if np.iscomplexobj(b) else 1))
 
 
+def _known_order(
+    backend: Backend, like: Cholesky | None, points: NDArray[np.float64] | None
+) -> Order | None:
+    """Return what CHOLMOD orders the rows by, if that is not its own minimum degree."""
+    if like is not None and like._kept is not None and like._kept.order is not None:
+        order = like._kept.order
+        return lambda _: order
+    if points is not None and backend == "cvxopt":
+        from cembench.linear_algebra.orderings import dissection_by_position
+
+        return partial(dissection_by_position, points=points)
+    return None
+
+
 def _factor(
     backend: Backend,
     A: scipy.sparse.csc_array,
     leading: int | None,
-    order: NDArray[np.int64] | None = None,
+    order: Order | None = None,
 ) -> _Factor:
-    """Factor a matrix with a back end, its rows in this order if that is known."""
+    """Factor a matrix with a back end, its rows ordered like this by CHOLMOD."""
     of_class = _factor_class(backend, order)
     if uses_cholmod(backend) and leading is not None and A.shape[0] - leading > LARGEST_DENSE:
         return _SeparateFactors(lambda block: of_class(block, None).solve, A, leading)
@@ -418,16 +440,16 @@ def _factor(
 
 
 def _factor_class(
-    backend: Backend, known: NDArray[np.int64] | None = None
+    backend: Backend, order: Order | None = None
 ) -> Callable[[scipy.sparse.csc_array, int | None], _Factor]:
-    """Return the constructor of a back end's factors, which takes a known order if it can."""
+    """Return the constructor of a back end's factors; CHOLMOD's order their rows like this."""
     # Imported on demand: an extra may be missing, and start-up should not load a solver.
     if uses_cholmod(backend):
         from cembench.linear_algebra.cholmod import CholmodFactor
         from cembench.linear_algebra.orderings import minimum_degree, nested_dissection
 
-        order = nested_dissection if backend == "cvxopt-metis" else minimum_degree
-        return partial(CholmodFactor, order=order if known is None else lambda _: known)
+        own = nested_dissection if backend == "cvxopt-metis" else minimum_degree
+        return partial(CholmodFactor, order=order or own)
     if backend == "superlu":
         from cembench.linear_algebra.superlu import superlu_solver
 

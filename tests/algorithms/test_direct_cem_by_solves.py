@@ -17,6 +17,7 @@ from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import flipped_triangles
+from cembench.linear_algebra import orderings
 from cembench.linear_algebra.cholesky import Among, Cholesky, linear_algebra
 from cembench.linear_algebra.work import counting
 from cembench.mesh.files import read_mesh
@@ -227,6 +228,20 @@ def test_estimated_energy_is_exact_for_modes_on_the_circle():
     z = np.exp(1j * theta) + 0.1 * np.exp(-3j * theta)
     assert estimated_energy(z, arcs) == pytest.approx(2 * np.pi * 3 * 0.01, rel=1e-3)
     assert estimated_energy(np.exp(1j * theta), arcs) == pytest.approx(0, abs=1e-12)
+
+
+def test_where_many_edges_are_flipped_the_rows_are_ordered_by_position(way, monkeypatch):
+    mesh, ordered = hemi_ellipsoid(3000, z=6.0), []
+    inside = orderings.dissection_by_position
+    monkeypatch.setattr(
+        orderings, "dissection_by_position", lambda *a, **k: ordered.append(1) or inside(*a, **k)
+    )
+    maps = []
+    for most in (0.0, 1.0):
+        monkeypatch.setattr(disk, "MANY_FLIPS", most)
+        maps.append(way(mesh, solves=True)[0].uv)
+        assert ordered == [1]
+    assert np.abs(maps[0] - maps[1]).max() < 1e-9
 
 
 @pytest.mark.slow
