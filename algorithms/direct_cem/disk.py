@@ -37,8 +37,8 @@ _Minimised = tuple[CircleDomain, str, Minimum, Callable[[Complex], Complex]]
 #: Arc length is no better a start than harmonic measure if its estimated energy is so many times
 #: the other one's, which is known.
 SURELY_MORE = 2
-#: Where flips change more than this share of the triangles, the interior is ordered by position.
-#: So it is on grids of heights, which lose what made minimum degree cheap; scans change by less.
+#: Where flips move more than this share of the triangles' corners, the interior is ordered by
+#: position: so on grids of heights, which lose what made minimum degree cheap. Scans have less.
 MANY_FLIPS = 0.2
 
 

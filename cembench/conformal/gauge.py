@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import double_areas
+from cembench.core.blocks import in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -68,6 +69,11 @@ def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
 
 def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the corners of the triangle nearest to the mean vertex; V is (n, 2 or 3)."""
-    a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
-    off = a + b + c - 3 * V.mean(axis=0)
-    return F[np.argmin(np.einsum("td,td->t", off, off))]
+    middle = 3 * V.mean(axis=0)
+
+    def squared_distances(some: NDArray[np.int64]) -> Real:
+        a, b, c = (V.take(some[:, k], axis=0) for k in range(3))
+        off = a + b + c - middle
+        return np.asarray(np.einsum("td,td->t", off, off))
+
+    return F[np.argmin(in_blocks(squared_distances, F))]

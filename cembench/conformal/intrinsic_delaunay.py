@@ -148,9 +148,10 @@ class _Corners:
     def not_delaunay(self, corners: Indices) -> Indices:
         """Return the corners whose edge is not Delaunay, the lower one of each edge's two."""
         twins = self.twin.take(corners)
-        inside = twins >= 0
-        corners, twins = corners[inside], twins[inside]
-        one, other = self.weight.take(corners), self.weight.take(twins)
+        one, other = self.weight.take(corners), self.weight.take(twins)  # of -1: the last one
+        negative = np.flatnonzero((one + other < 0) & (twins >= 0))
+        corners, twins = corners.take(negative), twins.take(negative)
+        one, other = one.take(negative), other.take(negative)
         wrong = one + other < -ROUNDING * (np.abs(one) + np.abs(other))
         corners, twins = corners[wrong], twins[wrong]
         wrong = corners // 3 != twins // 3  # such an edge cannot be flipped

@@ -139,7 +139,7 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
 def delaunay_laplacian(mesh: TriangleMesh) -> tuple[scipy.sparse.csc_array, float]:
     """Return the Laplacian (n, n) of the intrinsic Delaunay triangulation of a mesh.
 
-    And the share of the mesh's triangles that are not in this triangulation.
+    And the share of corners that flips moved to another vertex.
     """
     with phase("laplacian"):
         lengths, weights = np.empty((mesh.m, 3)), np.empty((mesh.m, 3))
@@ -152,8 +152,8 @@ def delaunay_laplacian(mesh: TriangleMesh) -> tuple[scipy.sparse.csc_array, floa
         small = mesh.n * SLOTS < 2**31
         before: NDArray[np.int64] = mesh.F.astype(np.int32 if small else np.int64)
         F, _, weights = intrinsic_delaunay(before, lengths, weights)
-        changed = 0 if F is before else np.count_nonzero((before != F).any(axis=1))
-        return laplacian_of_weights(F, weights, mesh.n), changed / mesh.m
+        changed = 0 if F is before else np.count_nonzero(before != F)
+        return laplacian_of_weights(F, weights, mesh.n), changed / F.size
 
 
 def by_rows(L: scipy.sparse.csc_array) -> scipy.sparse.csr_array:

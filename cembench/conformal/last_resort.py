@@ -74,14 +74,15 @@ def with_last_resort(method: DiskAlgorithm) -> DiskAlgorithm:
             uv, extras = valid_map(mesh, None)
             return Parameterization(uv, extras=extras | {"failure": str(error)})
         crowded = own.extras.get("stopped") == "crowded"
-        uv, extras = valid_map(mesh, own.uv, crowded=crowded)
+        folded = own.extras.get("folded_before_repair")
+        uv, extras = valid_map(mesh, own.uv, crowded=crowded, folded=folded)
         return Parameterization(uv, own.iterations, own.energy_history, own.extras | extras)
 
     return always_valid
 
 
 def valid_map(
-    mesh: DiskMesh, own: Complex | None, *, crowded: bool = False
+    mesh: DiskMesh, own: Complex | None, *, crowded: bool = False, folded: int | None = None
 ) -> tuple[Complex, dict[str, Any]]:
     """Return a map without folds, as close to an algorithm's own as its angles allow.
 
@@ -93,6 +94,8 @@ def valid_map(
         Its map with the boundary on the unit circle; None if the algorithm failed.
     crowded : bool
         Whether arcs of `own` are longer than they should be, because doubles hold no shorter ones.
+    folded : int, optional
+        The number of folded triangles of `own`, if known.
 
     Returns
     -------
@@ -115,7 +118,8 @@ def valid_map(
 
     """
     with phase("folds"):
-        folded = 0 if own is None else flipped_triangles(mesh, own)
+        if folded is None:
+            folded = 0 if own is None else flipped_triangles(mesh, own)
         extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
         if own is not None and not (folded or crowded):
             return own, extras

@@ -110,28 +110,27 @@ class FactorPart:
 
     def solve_everywhere(self, B: Real) -> Real:
         """Return all entries (n, k) of what :meth:`solve` finds."""
-        padded = np.zeros((self._tree.whole.n, B.shape[1]), order="F")
-        padded[self.columns] = self.forward(B)
-        x = matrix(padded)
+        x = matrix(0.0, (self._tree.whole.n, B.shape[1]))
+        np.asarray(x)[self.columns] = self.forward(B)
         cholmod.solve(self._tree.factor, x, sys=_BACKWARD)
         cholmod.solve(self._tree.factor, x, sys=_PERMUTE_BACK)
-        return np.array(x)
+        return np.asarray(x)
 
     def forward(self, B: Real) -> Real:
         """Return Y with L Y = B on the part, for B (rows, k) at the rows and 0 elsewhere."""
-        padded = np.zeros((len(self.columns), B.shape[1]), order="F")
-        padded[self.at] = B
-        return self._substituted(padded, _FORWARD)
+        x = matrix(0.0, (len(self.columns), B.shape[1]))
+        np.asarray(x)[self.at] = B
+        return self._substituted(x, _FORWARD)
 
     def backward(self, Y: Real) -> Real:
         """Return X with L^T X = Y on the part, which needs nothing of the rest."""
-        return self._substituted(Y, _BACKWARD)
+        return self._substituted(matrix(Y), _BACKWARD)
 
-    def _substituted(self, B: Real, step: int) -> Real:
+    def _substituted(self, x: matrix, step: int) -> Real:
+        """Solve in place, and return the numbers without a copy."""
         self._own.known.x = self._tree.whole.x  # it may have moved
-        x = matrix(B)
         cholmod.solve(self._part, x, sys=step)
-        return np.array(x)
+        return np.asarray(x)
 
 
 @cache

@@ -35,11 +35,13 @@ def permuted_lower(A: scipy.sparse.csr_array, order: NDArray[np.int64]) -> scipy
     kind = rows.indices.dtype
     place = np.full(A.shape[0], k, dtype=kind)
     place[order] = np.arange(k, dtype=kind)
-    columns = place[rows.indices]
+    columns = place.take(rows.indices)
     in_triangle = columns <= np.repeat(np.arange(k, dtype=kind), np.diff(rows.indptr))
-    ends = np.concatenate([[0], np.cumsum(in_triangle)])[rows.indptr].astype(kind)
+    before = np.zeros(rows.nnz + 1, dtype=kind)
+    np.cumsum(in_triangle, out=before[1:])
+    kept = np.flatnonzero(in_triangle)
     lower = scipy.sparse.csr_array(
-        (rows.data[in_triangle], columns[in_triangle], ends), shape=(k, k)
+        (rows.data.take(kept), columns.take(kept), before.take(rows.indptr)), shape=(k, k)
     ).tocsc()
     # Turning rows into columns takes them one after the other.
     lower.has_sorted_indices = True

@@ -80,12 +80,11 @@ def _pair_opposite(i: Indices, j: Indices, partner: Indices) -> None:
         return
     low, high = i.take(up), j.take(up)
     table = np.zeros((int(low.max()) + 1) * SLOTS, dtype=np.int32)
-    table[low * SLOTS + high % SLOTS] = np.arange(len(up), dtype=np.int32)
-    low_down, high_down = j.take(down), i.take(down)
-    at = low_down * SLOTS + high_down % SLOTS
-    match = table.take(np.minimum(at, len(table) - 1))
-    equal = np.flatnonzero((low.take(match) == low_down) & (high.take(match) == high_down))
-    match, down = up.take(match.take(equal)), down.take(equal)
+    table[low * SLOTS + high % SLOTS] = up
+    low, high = j.take(down), i.take(down)
+    match = table.take(np.minimum(low * SLOTS + high % SLOTS, len(table) - 1))
+    equal = (i.take(match) == low) & (j.take(match) == high)
+    match, down = match[equal], down[equal]
     partner[match], partner[down] = down, match
 
 

@@ -150,13 +150,13 @@ def test_flips_that_lead_far_are_all_made(monkeypatch):
         np.testing.assert_array_equal(near, whole)
 
 
-def test_the_share_of_changed_triangles_is_told():
+def test_the_share_of_moved_corners_is_told():
     assert delaunay_laplacian(flat_disk(600))[1] == 0
     mesh = hemi_ellipsoid(3000, z=6.0)
     L, changed = delaunay_laplacian(mesh)
     F, _, weights = of(mesh.V, mesh.F)
     assert abs(L - laplacian_of_weights(F, weights, mesh.n)).max() < 1e-9
-    assert changed == (mesh.F != F).any(axis=1).mean() > 0.1
+    assert changed == (mesh.F != F).mean() > 0.1
 
 
 @pytest.mark.parametrize("wrong", [False, True])
