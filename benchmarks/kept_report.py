@@ -17,11 +17,10 @@ from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section, Table
 from cembench.core.atomic import write_bytes, write_text
 from cembench.drawing.painter import jpeg
+from cembench.results.report_records import PACKED, RECORDS
 
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
-#: The records of a report, and of one that is kept: text of numbers packs to a third.
-RECORDS, PACKED = "records.csv", "records.csv.xz"
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 8, re.compile(r"-?\d+\.\d{7,}(?:e[+-]?\d+)?")
 #: Pictures of more bytes are kept as JPEG, of at most so many pixels across.
@@ -39,15 +38,6 @@ def shortened(page: str, report: str) -> str:
     """Return a report's page without links to what is not kept; `report` is its kept folder."""
     page = FORMS.sub("", LINKS.sub(r"\1", page)).replace(f"({RECORDS})", f"({PACKED})")
     return re.sub(r"(Made by `cembench report \S+ -o )\S+`", rf"\1{report}`", page)
-
-
-def records_of(report: Path) -> list[dict[str, str]]:
-    """Return the records of a report, a kept one or not, as rows of text."""
-    csv.field_size_limit(2**31 - 1)
-    packed = report / PACKED
-    data = lzma.decompress(packed.read_bytes()) if packed.is_file() else b""
-    text = data.decode() or (report / RECORDS).read_text(encoding="utf-8")
-    return list(csv.DictReader(io.StringIO(text)))
 
 
 def short_records(text: str) -> str:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.kept_report import PACKED, RECORDS, records_of
 from benchmarks.pages import ROOT, Section, Table
 from cembench.results.families import rate_interval
 from cembench.results.multiple_testing import geometric
+from cembench.results.report_records import PACKED, RECORDS, text_rows
 
 #: The kept report that README quotes.
 KEPT = ROOT / "reports/paper"
@@ -34,7 +34,7 @@ def ratios(report: Path, algorithm: str, policy: str) -> list[list[float]]:
     A model that was measured itself counts, and not its stand-in; of a method with several sets of
     parameters the one that was measured on most surfaces.
     """
-    there = [row for row in records_of(report) if row["solves"] == policy and row["status"] == "ok"]
+    there = [row for row in text_rows(report) if row["solves"] == policy and row["status"] == "ok"]
     counts = Counter((row["algorithm"], row["parameters"]) for row in there)
     rows: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
     for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):

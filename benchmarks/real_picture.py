@@ -9,11 +9,11 @@ from statistics import mean
 import matplotlib as mpl
 import numpy as np
 
-from benchmarks.kept_report import records_of
 from benchmarks.measuring import png
 from benchmarks.pages import ROOT, Section
 from cembench.report.content.findings import FLOOR
 from cembench.results.families import family_means, share_interval
+from cembench.results.report_records import text_rows
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
@@ -26,7 +26,7 @@ SHARES = (10, 50, 90)
 def by_algorithm(report: Path) -> dict[str, list[dict[str, str]]]:
     """Return the rows of maps to the disk or with a free boundary, by the algorithm's title."""
     values = defaultdict(list)
-    for row in records_of(report):
+    for row in text_rows(report):
         if row["target"] in TARGETS:
             values[row["title"]].append(row)
     return dict(values)

@@ -7,9 +7,9 @@ import re
 import sys
 from typing import Any
 
-from benchmarks.kept_report import records_of
 from benchmarks.origins import changed, origins, working_tree
 from benchmarks.pages import ROOT, Section, Table
+from cembench.results.report_records import text_rows
 from cembench.results.store import Store
 
 PAGE = "reports/README.md"
@@ -57,7 +57,7 @@ def measured_seconds(report: str) -> float:
     if (ROOT / report / "records").is_dir():  # a kept run
         outcomes = [one.outcome for one in Store(ROOT / report).records()]
         return sum(sum(each.calls) for one in outcomes for each in one.rounds)
-    return sum(sum(json.loads(row["seconds_raw"] or "[]")) for row in records_of(ROOT / report))
+    return sum(sum(json.loads(row["seconds_raw"] or "[]")) for row in text_rows(ROOT / report))
 
 
 def stale(*, check: bool = False, refresh: bool = False) -> Section:

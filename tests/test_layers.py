@@ -72,14 +72,14 @@ BUDGETS = {
     "linear_algebra": 1_550,
     "conformal": 6_410,
     "registry": 950,
-    "results": 4_810,
+    "results": 4_920,
     "running": 7_300,
     "drawing": 1_500,
-    "report": 7_480,
+    "report": 7_500,
     "validation": 2_270,
     "morphing": 1_350,
     "api": 5_050,
-    "commands": 2_880,
+    "commands": 2_900,
 }
 
 

@@ -25,6 +25,7 @@ from cembench.results.comparison import (
     compare,
     references,
 )
+from cembench.results.frame import listed
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.multiple_testing import corrected
@@ -135,23 +136,42 @@ def changes_table(changes: Sequence[Change]) -> Table:
     The ratio is corrected for the drift of the reference kernel, if both runs timed it.
     """
     comparisons = [change.comparison for change in changes]
+    policies = len({change.after["solves"] for change in changes}) > 1
     return Table.of(
         "changes",
         "",
         [
-            *(SURFACE, ALGORITHM, Column("before", form=".3f"), Column("after", form=".3f")),
+            *(SURFACE, ALGORITHM, *[Column("solves", numeric=False)] * policies),
+            *(Column("before", form=".3g"), Column("after", form=".3g")),
             *(Column("ratio", form=".2f"), Column("interval"), Column("verdict", numeric=False)),
         ],
         [
             [
-                *(change.after.cell.mesh, change.after.cell.algorithm),
-                *(one.outcome.median_seconds for one in (change.before, change.after)),
+                *(change.after["mesh"], change.after["algorithm"]),
+                *[change.after["solves"]] * policies,
+                *(one["seconds"] for one in (change.before, change.after)),
                 *(together.ratio, _interval(together.interval, "-"), together.verdict),
             ]
             for change, together in zip(changes, corrected(comparisons), strict=True)
         ],
-        notes=(_drift_words(changes), *_corrected_words(comparisons)),
+        notes=(_drift_words(changes), *_corrected_words(comparisons), *_verdict_words(changes)),
     )
+
+
+def _verdict_words(changes: Sequence[Change]) -> list[str]:
+    """Return how often two runs agree on cells against their reference, and where they do not."""
+    said = [change for change in changes if change.verdicts is not None]
+    if not said:
+        return []
+    same = sum(len(set(change.verdicts or ())) == 1 for change in said)
+    flipped = [change.after for change in said if change.flipped]
+    either = len(said) - same - len(flipped)
+    named = listed(": ", (f"{row['algorithm']} on {row['mesh']}" for row in flipped), between=", ")
+    return [
+        f"Against {said[0].after['reference']} both runs have the same verdict on {same} of "
+        f"{len(said)} cells, at most one of them decides on {either}, and they contradict on "
+        f"{len(flipped)}{named}."
+    ]
 
 
 def _drift_words(changes: Sequence[Change]) -> str:

@@ -276,6 +276,7 @@ EXPORTED = (
     _C("seconds", _at("outcome.median_seconds"), "seconds", timed=True, **_SECONDS),
     _C("seconds_raw", lambda r: list(r.outcome.seconds)),
     _C("seconds_together", _together),
+    _C("seconds_kernel", lambda r: [x.kernel_seconds for x in r.outcome.rounds]),
     _C("seconds_low", lambda r: _end(r, "low")),
     _C("seconds_high", lambda r: _end(r, "high")),
     _C("seconds_min", _fastest),

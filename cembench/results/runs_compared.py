@@ -1,83 +1,112 @@
-"""Compare the seconds of two runs cell by cell.
+"""Compare the seconds of two runs cell by cell, and what they say of the reference.
 
 Rounds of two runs are not paired, and the machine may have drifted between them. So every round
 also times a reference kernel that never changes (:mod:`cembench.running.reference_kernel`).
 The seconds of a cell are divided by the kernel's in the same round, and compared by the rank-sum
 test at the 5 % level. If a run has no kernel times, plain seconds are compared; the interval then
 ignores drift.
+
+A run is the rows of its frame (:func:`cembench.results.columns.rows`), or those of a report that
+was made from it (:mod:`cembench.results.report_records`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import exp, log
 from statistics import median
+from typing import Any
 
-from cembench.results.comparison import Comparison, circumstances, verdict_of
-from cembench.results.intervals import ERROR, Interval, share_of
+from cembench.results.comparison import Comparison, verdict_of
+from cembench.results.intervals import ERROR, Interval, share
 from cembench.results.rank_tests import shift_interval, unpaired_p
-from cembench.results.records import Record, Round
+
+Row = Mapping[str, Any]
+#: Digits of a hash that are enough to know a surface by; kept reports have no more.
+HASH_DIGITS = 16
+#: Verdicts that two runs may contradict each other in.
+_DECIDED = {"faster", "slower"}
 
 
 @dataclass(frozen=True)
 class Change:
     """One cell in two runs; the comparison is of the second run relative to the first."""
 
-    before: Record
-    after: Record
+    before: Row
+    after: Row
     comparison: Comparison
     #: Kernel seconds in the second run over those in the first, used to correct the comparison;
     #: None if one of the runs has none.
     drift: float | None = None
 
+    @property
+    def verdicts(self) -> tuple[str, str] | None:
+        """What each run says of the cell against its reference; None if one says nothing."""
+        said = tuple(row.get("verdict") for row in (self.before, self.after))
+        known = all(said) and self.before.get("reference") == self.after.get("reference")
+        return (str(said[0]), str(said[1])) if known else None
 
-def compare_runs(before: Sequence[Record], after: Sequence[Record]) -> list[Change]:
+    @property
+    def flipped(self) -> bool:
+        """Whether one run calls the cell faster than the reference and the other one slower."""
+        return self.verdicts is not None and set(self.verdicts) == _DECIDED
+
+
+def compare_runs(before: Sequence[Row], after: Sequence[Row]) -> list[Change]:
     """Compare the cells with the same algorithm, parameters, surface and circumstances.
 
     The code may differ; that is the purpose of the comparison.
     """
-    earlier = {_same(record): record for record in before}
-    pairs = [(earlier.get(_same(record)), record) for record in after]
+    earlier = {_same(row): row for row in before}
+    pairs = [(earlier.get(_same(row)), row) for row in after]
     return [
-        _change(old, record)
-        for old, record in pairs
-        if old is not None and old.outcome.rounds and record.outcome.rounds
+        _change(old, row)
+        for old, row in pairs
+        if old is not None and old["seconds_raw"] and row["seconds_raw"]
     ]
 
 
-def _change(before: Record, after: Record) -> Change:
-    old, new = before.outcome.rounds, after.outcome.rounds
-    drift = _drift(old, new)
-    ours, theirs = (_logs(rounds, corrected=drift is not None) for rounds in (new, old))
+def _change(before: Row, after: Row) -> Change:
+    old, new = len(before["seconds_raw"]), len(after["seconds_raw"])
+    drift = _drift(before, after)
+    ours, theirs = (_logs(row, corrected=drift is not None) for row in (after, before))
     ratio = exp(median(ours) - median(theirs))
-    share = min(share_of(len(new), after.cell), share_of(len(old), before.cell))
-    shift = shift_interval(ours, theirs, ERROR * share)
+    part = min(_share(row) for row in (before, after))
+    shift = shift_interval(ours, theirs, ERROR * part)
     interval = (
         None if shift is None else Interval(min(exp(shift.low), ratio), max(exp(shift.high), ratio))
     )
-    p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / share)
-    rounds = min(len(new), len(old))
-    return Change(
-        before, after, Comparison(ratio, interval, verdict_of(interval), rounds, p), drift
-    )
+    p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / part)
+    found = Comparison(ratio, interval, verdict_of(interval), min(new, old), p)
+    return Change(before, after, found, drift)
 
 
-def _logs(rounds: Sequence[Round], *, corrected: bool) -> list[float]:
+def _share(row: Row) -> float:
+    """Return the part of the 5 % error for one look: all if the rounds were fixed in advance."""
+    return 1.0 if row.get("precision") is None else share(len(row["seconds_raw"]))
+
+
+def _kernel(row: Row) -> list[float] | None:
+    """Return the kernel's seconds of each round; None if a round has none."""
+    kernel = row.get("seconds_kernel") or []
+    return kernel if all(kernel) and len(kernel) == len(row["seconds_raw"]) else None
+
+
+def _logs(row: Row, *, corrected: bool) -> list[float]:
     """Return the logarithms of the seconds, divided by the kernel's if `corrected`."""
-    return [log(r.seconds) - (log(r.kernel_seconds or 1.0) if corrected else 0.0) for r in rounds]
+    kernel = (_kernel(row) if corrected else None) or [1.0] * len(row["seconds_raw"])
+    return [log(seconds / one) for seconds, one in zip(row["seconds_raw"], kernel, strict=True)]
 
 
-def _drift(before: Sequence[Round], after: Sequence[Round]) -> float | None:
+def _drift(before: Row, after: Row) -> float | None:
     """Return the ratio of the kernel's seconds, after over before; None if a round has none."""
-    old, new = (
-        [r.kernel_seconds for r in rounds if r.kernel_seconds] for rounds in (before, after)
-    )
-    if len(old) < len(before) or len(new) < len(after):
+    old, new = _kernel(before), _kernel(after)
+    if old is None or new is None:
         return None
     return exp(median(map(log, new)) - median(map(log, old)))
 
 
-def _same(record: Record) -> str:
-    cell = record.cell
-    return f"{cell.algorithm} {sorted(cell.parameters.items())} {circumstances(cell)}"
+def _same(row: Row) -> str:
+    where = f"{row['mesh_hash'][:HASH_DIGITS]} {row['solves']} {row['backend']} {row['threads']}"
+    return f"{row['algorithm']} {sorted(row['parameters'].items())} {where}"

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from benchmarks.kept_report import LEFT_OUT, kept_report, records_of, rounded, shortened
+from benchmarks.kept_report import LEFT_OUT, kept_report, rounded, shortened
 from benchmarks.pages import ROOT
 from cembench.report.pictures import size_of
+from cembench.results.report_records import text_rows
 
 
 def test_links_to_what_is_left_out_become_plain_text():
@@ -43,7 +44,7 @@ def test_only_what_the_page_shows_is_copied_and_what_was_there_goes(tmp_path):
     files = {file.relative_to(kept).as_posix() for file in kept.rglob("*") if file.is_file()}
     assert files == {"report.md", "records.csv.xz", "figures/a.png", "tables/t.csv"}
     rows = [{"mesh": "0f" * 8, "seconds": "1.5"}, {"mesh": "b", "seconds": "0.12345679"}]
-    assert records_of(kept) == rows
+    assert text_rows(kept) == rows
     first = (kept / "records.csv.xz").read_bytes()
     kept_report(report, kept)
     assert (kept / "records.csv.xz").read_bytes() == first
@@ -71,7 +72,7 @@ def test_every_link_of_a_kept_report_leads_somewhere(report):
 
 
 def test_records_of_the_real_surfaces_are_kept_in_short():
-    rows = records_of(ROOT / "reports/real")
+    rows = text_rows(ROOT / "reports/real")
     assert all(rounded(value) == value for row in rows for value in row.values())
     assert not set(LEFT_OUT) & set(rows[0])
     assert len(rows) > 1000

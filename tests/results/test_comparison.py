@@ -1,6 +1,7 @@
 import numpy as np
 import pytest
 
+from cembench.results.columns import rows
 from cembench.results.comparison import (
     circumstances,
     compare,
@@ -108,9 +109,14 @@ def test_shared_processes_count_only_where_each_round_has_one():
     assert not compare(ours, theirs).together
 
 
+def compared_runs(before, after):
+    """Compare two runs of these records."""
+    return compare_runs(rows(before), rows(after))
+
+
 def test_there_is_no_comparison_without_times():
     assert compare(record_of([]), record_of([1.0])) is None
-    assert compare_runs([record_of([])], [record_of([1.0])]) == []
+    assert compared_runs([record_of([])], [record_of([1.0])]) == []
 
 
 def test_swapping_both_inverts_the_ratio():
@@ -165,12 +171,12 @@ def test_a_figure_is_unstable_where_its_interval_is_wide():
 def test_two_runs_compare_cell_by_cell():
     before = [record_of([2.0, 2.1, 2.2, 2.0, 2.1, 2.0]), record_of([1.0] * 6, solves="backslash")]
     after = [record_of([1.0] * 6, code_hash="other"), record_of([1.0] * 6, threads=2)]
-    (change,) = compare_runs(before, after)
+    (change,) = compared_runs(before, after)
     assert change.comparison.verdict == "faster"
     interval = change.comparison.interval
     assert (interval.low, interval.high) == (pytest.approx(1 / 2.2), pytest.approx(0.5))
     assert change.drift is None
-    (few,) = compare_runs([record_of([1.0])], [record_of([2.0])])
+    (few,) = compared_runs([record_of([1.0])], [record_of([2.0])])
     assert few.comparison.verdict == "too few rounds"
 
 

@@ -1,7 +1,16 @@
+import lzma
+
 import numpy as np
 import pytest
 
-from cembench.results.runs_compared import compare_runs
+from cembench.core.errors import RecordError
+from cembench.report.export import export_rows
+from cembench.report.export_format import Format
+from cembench.report.run_tables import changes_table
+from cembench.results import runs_compared
+from cembench.results.columns import rows
+from cembench.results.report_records import has_records, read_rows
+from tests.results.test_comparison import compared_runs as compare_runs
 from tests.results.test_comparison import record_of
 
 
@@ -55,3 +64,47 @@ def test_equal_runs_are_called_different_in_at_most_5_percent():
         ]
         wrong += compare_runs(*runs)[0].comparison.verdict != "undecided"
     assert wrong / 300 <= 0.05 + 0.026  # two standard deviations
+
+
+@pytest.mark.parametrize("packed", [False, True])
+def test_a_report_stands_for_its_run(tmp_path, packed):
+    rng = np.random.default_rng(5)
+    records = [
+        measured(rng.lognormal(0, 0.02, 8), rng.lognormal(0, 0.02, 8)),
+        record_of([1.0] * 7, algorithm="fdm"),
+        record_of([], algorithm="ldm"),
+    ]
+    run, file = rows(records), tmp_path / "records.csv"
+    assert not has_records(tmp_path)
+    export_rows(run, file, Format.csv)
+    if packed:
+        (tmp_path / "records.csv.xz").write_bytes(lzma.compress(file.read_bytes()))
+        file.unlink()
+    assert has_records(tmp_path)
+    report = read_rows(tmp_path)
+    assert [row["parameters"] for row in report] == [row["parameters"] for row in run]
+    for pair in ((run, report), (report, run)):
+        changes = runs_compared.compare_runs(*pair)
+        assert [(c.comparison.ratio, c.drift) for c in changes] == [(1, 1), (1, None)]
+
+
+def test_records_that_are_no_table_are_refused(tmp_path):
+    with pytest.raises(RecordError, match="neither"):
+        read_rows(tmp_path)
+    (tmp_path / "records.csv.xz").write_bytes(b"not packed")
+    with pytest.raises(RecordError, match="not a table"):
+        read_rows(tmp_path)
+
+
+def test_runs_that_contradict_each_other_are_named():
+    reference = record_of([1.0] * 7, algorithm="cem")
+    runs = [
+        rows([reference, record_of([seconds] * 7, algorithm="fdm", parameters={"a": k})])
+        for k, seconds in enumerate((2.0, 0.5, 1.0))
+    ]
+    for run in runs:
+        run[1]["parameters"] = {}
+    changes = runs_compared.compare_runs(runs[0], runs[1])
+    assert [change.flipped for change in changes] == [False, True]
+    assert not any(change.flipped for change in runs_compared.compare_runs(runs[0], runs[2]))
+    assert "they contradict on 1: fdm on" in " ".join(changes_table(changes).notes)
