@@ -72,7 +72,7 @@ BUDGETS = {
     "linear_algebra": 1_550,
     "conformal": 6_410,
     "registry": 950,
-    "results": 4_920,
+    "results": 4_950,
     "running": 7_300,
     "drawing": 1_500,
     "report": 7_500,

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import csv
 import io
-import json
 import lzma
 from pathlib import Path
 from typing import Any
+
+from pydantic import BaseModel, Json, PositiveFloat, ValidationError
 
 from cembench.core.errors import RecordError
 
 #: The file of a report, and of one that a repository keeps.
 RECORDS, PACKED = "records.csv", "records.csv.xz"
-#: Columns of text, whatever it looks like.
-_TEXT = frozenset({"mesh", "title", "cause", "source", "family", "mesh_hash", "environment", "key"})
 #: Largest number of bytes that packed records may unpack to.
 LARGEST = 2**30
 
@@ -40,30 +39,49 @@ def text_rows(folder: Path) -> list[dict[str, str]]:
     try:
         data = file.read_bytes()
         if file.name == PACKED:
-            data = lzma.LZMADecompressor(memlimit=LARGEST).decompress(data, LARGEST)
+            unpack = lzma.LZMADecompressor(memlimit=LARGEST)
+            data = unpack.decompress(data, LARGEST)
+            if not unpack.eof:
+                raise lzma.LZMAError(f"it is cut short, or unpacks to over {LARGEST:,} bytes")
         return list(csv.DictReader(io.StringIO(data.decode()), strict=True))
     except (OSError, lzma.LZMAError, UnicodeDecodeError, csv.Error) as error:
         raise RecordError(f"{file} is not a table of records: {error}") from None
 
 
+class _Cell(BaseModel):
+    """What a row says of a cell and its times."""
+
+    mesh: str
+    algorithm: str
+    parameters: Json[dict[str, Any]]
+    solves: str
+    backend: str
+    threads: int
+    mesh_hash: str
+    precision: float | None = None
+    environment: str
+    seconds: PositiveFloat | None = None
+    seconds_raw: Json[list[PositiveFloat]]
+    seconds_kernel: Json[list[PositiveFloat | None]] = []
+    reference: str | None = None
+    verdict: str | None = None
+
+
 def read_rows(folder: Path) -> list[dict[str, Any]]:
-    """Return the records of a report as :func:`cembench.results.columns.rows` gives them.
+    """Return the timed cells of a report: some columns of :func:`cembench.results.columns.rows`.
 
-    Numbers have the digits that were written. Raises as :func:`text_rows`.
+    Numbers have the digits that were written. Raises as :func:`text_rows`, and where a record does
+    not say which cell it is of.
     """
-    return [
-        {name: text if name in _TEXT else _value(text) for name, text in row.items()}
-        for row in text_rows(folder)
-    ]
-
-
-def _value(text: str | None) -> Any:
-    """Return what an entry stands for: nothing, a number, a list, a dictionary or text."""
-    if text in ("", None):
-        return None
-    if text in ("True", "False"):
-        return text == "True"
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
+    rows = []
+    for number, row in enumerate(text_rows(folder), start=1):
+        told = {name: text for name, text in row.items() if name and text}
+        try:
+            rows.append(_Cell.model_validate(told).model_dump())
+        except ValidationError as error:
+            first = error.errors()[0]
+            raise RecordError(
+                f"record {number} in {folder}: {first['loc'][0]}: {first['msg']}. Make the report "
+                "again, or name the folder of its run."
+            ) from None
+    return rows

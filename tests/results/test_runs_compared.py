@@ -91,9 +91,23 @@ def test_a_report_stands_for_its_run(tmp_path, packed):
 def test_records_that_are_no_table_are_refused(tmp_path):
     with pytest.raises(RecordError, match="neither"):
         read_rows(tmp_path)
-    (tmp_path / "records.csv.xz").write_bytes(b"not packed")
-    with pytest.raises(RecordError, match="not a table"):
-        read_rows(tmp_path)
+    packed, file = tmp_path / "records.csv.xz", tmp_path / "records.csv"
+    export_rows(rows([record_of([1.0] * 6)]), file, Format.csv)
+    whole = lzma.compress(file.read_bytes())
+    for data in (b"not packed", whole[:-20], lzma.compress(b"a,b\n\xff,2\n"), b""):
+        packed.write_bytes(data)
+        with pytest.raises(RecordError, match="not a table"):
+            read_rows(tmp_path)
+    packed.unlink()
+    text = file.read_text()
+    for good, bad in (
+        *(("seconds_raw", "other"), ("[1.0, ", "[-1.0, "), ("{}", "[]")),
+        ("a,", "a,,,,,,,,,,"),
+    ):
+        assert good in text
+        file.write_text(text.replace(good, bad, 1))
+        with pytest.raises(RecordError, match="record 1"):
+            read_rows(tmp_path)
 
 
 def test_runs_that_contradict_each_other_are_named():
