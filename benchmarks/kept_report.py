@@ -23,8 +23,8 @@ from cembench.results.report_records import PACKED, RECORDS
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 6, re.compile(r"-?\d+\.\d{6,}(?:e[+-]?\d+)?")
-#: Pictures of more bytes are kept as JPEG, of at most so many pixels across; plots have few colours.
-LARGE, WIDTH, COLOURS = 200_000, 1200, 256
+#: Pictures of more bytes are kept as JPEG, of at most so many pixels across.
+LARGE, WIDTH = 200_000, 1200
 #: Hashes, of which a quarter is kept: the first digits name them, and hashes do not pack.
 HASH = re.compile(r"\b([0-9a-f]{16})[0-9a-f]{48}\b")
 #: Links to what is left out, and the forms of a figure besides its picture: the records hold the
@@ -58,24 +58,12 @@ def rounded(text: str) -> str:
     >>> rounded("[0.12345678901234567, 1.5e-12, 1.23456789012e-05]")
     '[0.123457, 1.5e-12, 1.23457e-05]'
     """
-    text = HASH.sub(r"\1", text)
+    return with_few_digits(HASH.sub(r"\1", text))
+
+
+def with_few_digits(text: str) -> str:
+    """Return text with all numbers in it rounded."""
     return LONG.sub(lambda number: f"{float(number[0]):.{DIGITS}g}", text)
-
-
-def _kept_picture(source: Path, target: Path) -> str:
-    """Keep a picture in few colours, or a large one as JPEG, and return the name of the file."""
-    with Image.open(source) as opened:
-        picture = opened.convert("RGB")
-    if source.stat().st_size > LARGE:
-        target = target.with_suffix(".jpg")
-        picture.thumbnail((WIDTH, 10 * WIDTH))
-        write_bytes(target, jpeg(np.asarray(picture)))
-    else:
-        packed = io.BytesIO()
-        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(packed, "PNG", optimize=True)
-        smaller = len(packed.getvalue()) < source.stat().st_size
-        write_bytes(target, packed.getvalue() if smaller else source.read_bytes())
-    return target.name
 
 
 def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: str = "") -> Section:
@@ -101,9 +89,13 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         shutil.rmtree(folder)
     for file in set(FILES.findall(page)):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        if file.endswith(".png"):
-            small = _kept_picture(report / file, folder / file)
-            page = page.replace(f"]({file})", f"]({Path(file).with_name(small)})")
+        if file.endswith(".png") and (report / file).stat().st_size > LARGE:
+            small = file.removesuffix(".png") + ".jpg"
+            with Image.open(report / file) as opened:
+                picture = opened.convert("RGB")
+            picture.thumbnail((WIDTH, 10 * WIDTH))
+            write_bytes(folder / small, jpeg(np.asarray(picture)))
+            page = page.replace(f"]({file})", f"]({small})")
         else:
             shutil.copy(report / file, folder / file)
     write_text(folder / "report.md", page)

@@ -7,6 +7,7 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
+from benchmarks.kept_report import with_few_digits
 from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section
 from cembench.core.atomic import write_text
@@ -19,6 +20,18 @@ from cembench.results.store import Store
 LEFT_OUT = ("maps", "meshes", "samples", "lock")
 
 
+def shorten(file: Path, hide: Sequence[Path] = ()) -> None:
+    """Write a JSON file of a run in short: a record's figures rounded, and its digest anew."""
+    text = file.read_text(encoding="utf-8")
+    for path in hide:
+        text = text.replace(str(path), path.name)
+    content = json.loads(text)
+    if "digest" in content:
+        content["outcome"] = json.loads(with_few_digits(json.dumps(content["outcome"])))
+        content["digest"] = digest(content)
+    write_text(file, json.dumps(content, separators=(",", ":"), ensure_ascii=False) + "\n")
+
+
 def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str = "") -> Section:
     """Keep a run's records, without maps and surfaces: `cembench report` makes its page again.
 
@@ -26,8 +39,9 @@ def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str
         python -m benchmarks kept-run results/ldm reports/papers/ldm2018 --hide ~/ldm
         cembench report reports/papers/ldm2018 --paper ldm2018
 
-    A folder of `hide`, one that others do not have, is named by its last part, and the record that
-    named it gets its digest anew. The folder is replaced if it holds a run. `command` is the one
+    A folder of `hide`, one that others do not have, is named by its last part. Figures are rounded
+    as in a kept report, and records get their digests anew. The folder is replaced if it holds a
+    run. `command` is the one
     that measured it, for `make refresh`.
     """
     run_folder.check(run)
@@ -41,14 +55,7 @@ def kept_run(run: Path, folder: Path, *, hide: Sequence[Path] = (), command: str
     shutil.copytree(run, folder, ignore=shutil.ignore_patterns(*LEFT_OUT))
     files = sorted(folder.rglob("*.json"))
     for file in files:
-        text = shown = file.read_text(encoding="utf-8")
-        for path in hide:
-            shown = shown.replace(str(path), path.name)
-        if shown != text:
-            content = json.loads(shown)
-            if "digest" in content:
-                content["digest"] = digest(content)
-            write_text(file, json.dumps(content, indent=2, ensure_ascii=False) + "\n")
+        shorten(file, hide)
     if folder.is_relative_to(ROOT):
         measured = [one.get("git") for one in Store(folder).environments().values()]
         commit = max(((git or {}).get("commit") or "" for git in measured), default="")[:12]
