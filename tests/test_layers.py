@@ -73,7 +73,7 @@ BUDGETS = {
     "conformal": 6_410,
     "registry": 950,
     "results": 4_950,
-    "running": 7_300,
+    "running": 7_310,
     "drawing": 1_500,
     "report": 7_500,
     "validation": 2_270,

@@ -440,6 +440,11 @@ def benchmark(
             "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of "
             "them."
         )
+    if rounds is not None and budget not in ("auto", None):
+        raise ParameterError.about(
+            "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one "
+            "of them. {precision} and {max_rounds} choose the rounds within a budget."
+        )
     if sets and rounds is None and precision is None:
         rounds = 1
     share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)

@@ -164,6 +164,12 @@ def test_the_map_of_a_file_is_that_of_parameterize(cli, cap):
             "--rounds fixes the number of rounds, and --precision chooses it",
         ),
         (
+            lambda: cembench.benchmark(["flat-disk"], rounds=6, budget="1m"),
+            ("run", "--surfaces", "flat-disk", "--rounds", 6, "--budget", "1m"),
+            "`rounds` fixes the number of rounds, which `budget` does not shorten",
+            "--rounds fixes the number of rounds, which --budget does not shorten",
+        ),
+        (
             lambda: cembench.benchmark(["flat-disk"], memory_bytes="much"),
             ("run", "--surfaces", "flat-disk", "--memory", "much"),
             "memory_bytes='much' is not a size",

@@ -1,3 +1,7 @@
+import os
+import subprocess
+import sys
+
 import pytest
 
 from cembench.results.records import Neighbours
@@ -52,3 +56,29 @@ def test_the_kernel_is_repeated_for_rounds_of_many_processes(monkeypatch):
     assert kernel_seconds(8) == 6.0
     assert kernel_seconds(1000) == 3.0
     assert len(list(seconds)) == 100 - reference_kernel.AT_MOST
+
+
+FAULTS = """
+import resource
+import numpy as np
+from cembench.running import reference_kernel
+inside, faults = reference_kernel._timed, []
+def counted(matrix):
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+    seconds = inside(matrix)
+    faults.append(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+    return seconds
+reference_kernel._timed = counted
+{before}
+reference_kernel.kernel_seconds(3)
+print(sum(faults) / len(faults))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="this is glibc's allocator")
+@pytest.mark.parametrize("before", ["", "large = np.ones(3_000_000); del large"])
+def test_the_kernel_s_memory_is_there_whatever_its_process_freed_before(before):
+    plain = {k: v for k, v in os.environ.items() if not k.startswith(("GLIBC_", "MALLOC_"))}
+    command = [sys.executable, "-c", FAULTS.format(before=before)]
+    done = subprocess.run(command, env=plain, capture_output=True, text=True, check=True)
+    assert float(done.stdout) < 100
