@@ -70,20 +70,20 @@ def direct_cem(
 
     Decided here: the weights are those of the intrinsic Delaunay triangulation, none of which is
     negative; with `delaunay` off they are the cotangents of the mesh's own edges, as in CEM. The
-    recorded energies use the same weights. The start is the harmonic measure of the
-    boundary from the triangle nearest to the mean vertex, or arc length if that has lower energy
-    (`start`). It is moved into the `gauge`, that is, a mean is moved to 0: of the boundary by
-    length, of that triangle, or of the surface by area; from there on Moebius maps are fixed by the
-    start's arcs. The iteration ends when the gradient, whose squared norm is about twice what E_C
-    can still decrease, shows that this is at most `tolerance` times E_C (`stopped`: "gradient"),
-    when only rounding is left ("rounding"), after `max_iterations` ("iterations"), or when too many
-    arcs would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those
-    held). Near its minimum E_C is flat but the angles are not, and harmonic measure has better
-    ones. So the boundary is finally moved back towards it as far as that raises E_C by at most the
-    share `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most
-    `even` more steps, each as dear as all of this, lower the mean angle error with weights that
-    count all triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired as in
-    CEM (`fold_repairs`); `last_resort` makes the map valid in any case.
+    recorded energies use the same weights. The start is the harmonic measure of the boundary from
+    the triangle nearest to the mean vertex, or arc length if that has lower energy (`start`). It is
+    moved into the `gauge`, that is, a mean is moved to 0: of the boundary by length, of that
+    triangle, or of the surface by area; from there on Moebius maps are fixed by the start's arcs.
+    The iteration ends when the gradient, whose squared norm is about twice what E_C can still
+    decrease, shows that this is at most `tolerance` times E_C (`stopped`: "gradient"), when
+    only rounding is left ("rounding"), after `max_iterations` ("iterations"), or when too many arcs
+    would fall below a tenth of their initial length ("crowded"; `held_arcs` counts those held).
+    Near its minimum E_C is flat but the angles are not, and harmonic measure has better ones. So
+    the boundary is finally moved back towards it as far as that raises E_C by at most the share
+    `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most `even`
+    more steps, each as dear as all of this, lower the mean angle error with weights that count all
+    triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired as in CEM
+    (`fold_repairs`); `last_resort` makes the map valid in any case.
     """
     del even  # the decorator's
     L, flipped = delaunay_laplacian(mesh) if delaunay else (laplacian(mesh), 0.0)

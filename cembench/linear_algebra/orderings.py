@@ -19,14 +19,6 @@ from cembench.linear_algebra.supernodes import order_of
 
 #: Binary digits of a coordinate; the three together fit a double's 53.
 DIGITS = 17
-#: Shifts and masks that move up to 21 digits three places apart.
-SPREAD = (
-    (32, 0x1F00000000FFFF),
-    (16, 0x1F0000FF0000FF),
-    (8, 0x100F00F00F00F00F),
-    (4, 0x10C30C30C30C30C3),
-    (2, 0x1249249249249249),
-)
 
 
 def set_options(*, postorder: bool) -> None:
@@ -98,10 +90,11 @@ def _interleaved(points: NDArray[np.float64]) -> NDArray[np.int64]:
 @cache
 def _spread_digits() -> NDArray[np.int64]:
     """Return each number of so many binary digits with these three places apart."""
-    digits = np.arange(2**DIGITS)
-    for shift, mask in SPREAD:
-        digits = (digits | digits << shift) & mask
-    return digits
+    numbers = np.arange(2**DIGITS)
+    spread = np.zeros_like(numbers)
+    for digit in range(DIGITS):
+        spread |= (numbers >> digit & 1) << 3 * digit
+    return spread
 
 
 def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -75,9 +75,9 @@ def read_rows(folder: Path) -> list[dict[str, Any]]:
     """
     rows = []
     for number, row in enumerate(text_rows(folder), start=1):
-        told = {name: text for name, text in row.items() if name and text}
+        filled = {name: text for name, text in row.items() if name and text}
         try:
-            rows.append(_Cell.model_validate(told).model_dump())
+            rows.append(_Cell.model_validate(filled).model_dump())
         except ValidationError as error:
             first = error.errors()[0]
             raise RecordError(
