@@ -99,7 +99,7 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
 
     records = tuple(map(with_folds, evidence.records))
     claim = claim_of(replace(evidence, records=records), "no-folding")
-    told = f"119 triangles are folded on 1 of 3 surfaces ({vase.title}: 119)"
+    told = f"119 triangles are folded on 1 of 3 surfaces ({vase.title}ˢ: 119)"
     assert claim.figures == (
         f"Before the repair, {told}; in the maps that are compared, 0 triangles are folded on 0 of "
         "3 surfaces."
@@ -223,7 +223,7 @@ def test_the_four_faces_are_judged_from_the_stored_maps(found, inspections, evid
     claim = found["below-one-degree"]
     (surface,) = (s for s in evidence.models if s.paper_row == "Liu's Neutral Face")
     share = inspections[surface.mesh_hash].angles["CEM"].below_one
-    assert claim.figures.startswith(f"Liu's Neutral Face: {share:.1%}")
+    assert claim.figures.startswith(f"Liu's Neutral Faceˢ: {100 * share:.1f} %")
     assert all(seen.angles["CEM"].agrees for seen in inspections.values())
 
 

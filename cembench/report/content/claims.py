@@ -14,7 +14,7 @@ from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
-from cembench.report.document import VERDICTS, Claim, Column, Table, Verdict
+from cembench.report.document import ORIGINS, VERDICTS, Claim, Column, Table, Verdict
 from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
 from cembench.results.frame import evaluate, filled
 from cembench.results.papers import StatedClaim
@@ -56,6 +56,7 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
 def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
     """Return the run's frame with what claims need besides.
 
+    `surface` has the mark of its origin, since a stand-in is named as the model that it stands for.
     `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
     their algorithm on a surface, whatever the policy. `below_one` is the share of the corners whose
     angles change by less than a degree.
@@ -69,7 +70,9 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
         for label, angles in seen.angles.items()
     }
     maps = zip(frame["mesh_hash"], frame["label"], chosen, strict=True)
+    marks = {origin: mark for origin, (_, mark) in ORIGINS.items()}
     return frame.assign(
+        surface=frame["surface"] + frame["origin"].map(marks),
         policy=frame["solves"].map(evidence.policies.index),
         chosen=chosen,
         below_one=[known.get((place, label)) if one else None for place, label, one in maps],
