@@ -10,21 +10,19 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
 from PIL import Image
 
 from benchmarks.origins import MEASURING, record
 from benchmarks.pages import ROOT, Section, Table
 from cembench.core.atomic import write_bytes, write_text
-from cembench.drawing.painter import jpeg
 from cembench.results.report_records import PACKED, RECORDS
 
 #: Columns of records that a kept report leaves out: long ones that nothing of it shows.
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 6, re.compile(r"-?\d+\.\d{6,}(?:e[+-]?\d+)?")
-#: Pictures of more bytes are kept as JPEG, of at most so many pixels across.
-LARGE, WIDTH = 200_000, 1200
+#: JPEGs, and pictures of more bytes, are kept as WebP, of at most so many pixels across.
+LARGE, WIDTH, QUALITY = 200_000, 1200, 70
 #: Hashes, of which a quarter is kept: the first digits name them, and hashes do not pack.
 HASH = re.compile(r"\b([0-9a-f]{16})[0-9a-f]{48}\b")
 #: Links to what is left out, and the forms of a figure besides its picture: the records hold the
@@ -66,6 +64,16 @@ def with_few_digits(text: str) -> str:
     return LONG.sub(lambda number: f"{float(number[0]):.{DIGITS}g}", text)
 
 
+def webp(file: Path) -> bytes:
+    """Return a picture as WebP."""
+    with Image.open(file) as opened:
+        picture = opened.convert("RGB")
+    picture.thumbnail((WIDTH, 10 * WIDTH))
+    buffer = io.BytesIO()
+    picture.save(buffer, "WEBP", quality=QUALITY, method=6)
+    return buffer.getvalue()
+
+
 def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: str = "") -> Section:
     """Shorten a report to what the repository keeps: page, plots, tables and records.
 
@@ -89,13 +97,11 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         shutil.rmtree(folder)
     for file in set(FILES.findall(page)):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        if file.endswith(".png") and (report / file).stat().st_size > LARGE:
-            small = file.removesuffix(".png") + ".jpg"
-            with Image.open(report / file) as opened:
-                picture = opened.convert("RGB")
-            picture.thumbnail((WIDTH, 10 * WIDTH))
-            write_bytes(folder / small, jpeg(np.asarray(picture)))
-            page = page.replace(f"]({file})", f"]({small})")
+        large = (report / file).stat().st_size > LARGE
+        if file.endswith(".jpg") or (file.endswith(".png") and large):
+            small = Path(file).with_suffix(".webp")
+            write_bytes(folder / small, webp(report / file))
+            page = page.replace(f"]({file})", f"]({small.as_posix()})")
         else:
             shutil.copy(report / file, folder / file)
     write_text(folder / "report.md", page)

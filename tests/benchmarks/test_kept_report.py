@@ -56,12 +56,14 @@ def test_a_large_picture_is_kept_as_a_smaller_one_that_the_page_shows(tmp_path):
     noise = np.random.default_rng(1).integers(0, 256, (200, 2000, 3), dtype=np.uint8)
     Image.fromarray(noise).save(report / "figures/a.png")
     Image.fromarray(noise[:20, :20]).save(report / "figures/b.png")
-    (report / "report.md").write_text("![A](figures/a.png) ![B](figures/b.png)")
+    Image.fromarray(noise[:20, :20]).save(report / "figures/c.jpg")
+    page = "![A](figures/a.png) ![B](figures/b.png) ![C](figures/c.jpg)"
+    (report / "report.md").write_text(page)
     (report / "records.csv").write_text("mesh\na\n")
     kept_report(report, kept)
-    assert (kept / "report.md").read_text() == "![A](figures/a.jpg) ![B](figures/b.png)"
-    assert {file.name for file in (kept / "figures").iterdir()} == {"a.jpg", "b.png"}
-    assert size_of(kept / "figures/a.jpg") == (1200, 120)
+    assert (kept / "report.md").read_text() == page.replace("a.png", "a.webp").replace("jpg", "webp")
+    assert {file.name for file in (kept / "figures").iterdir()} == {"a.webp", "b.png", "c.webp"}
+    assert size_of(kept / "figures/a.webp") == (1200, 120)
 
 
 @pytest.mark.parametrize("report", ["paper", "real"])

@@ -28,7 +28,8 @@ def test_readme_says_what_the_kept_report_says():
 def test_another_report_gives_another_table(tmp_path):
     shutil.copytree(ROOT / "reports/paper/tables", tmp_path / "tables")
     averages = tmp_path / "tables/averages.csv"
-    averages.write_text(averages.read_text().replace("25.05881502064699", "7.25"))
+    kept = readme_speedups.averages(averages)["mean rate (as the paper)"]["QIEM here"]
+    averages.write_text(averages.read_text().replace(kept, "7.25"))
     assert "| QIEM | 8.5 | 6.8 | 7.2 |" in speedups(tmp_path)
 
 
@@ -41,13 +42,13 @@ def test_the_rounds_of_the_records_give_the_averages_of_the_tables(policy):
         figures = np.exp([np.median(np.log(one)) for one in ratios])
         for reading, average in readme_speedups.AVERAGES.items():
             rate = average(figures) - 1
-            assert rate == pytest.approx(float(there[reading][f"{name} here"]))
+            assert rate == pytest.approx(float(there[reading][f"{name} here"]), rel=1e-5)
 
 
 def test_averages_have_intervals_where_cells_have_six_rounds():
     cells = [cell for line in speedups().splitlines()[2:] for cell in line.split("|")[4:8]]
     known = [cell for cell in cells if "(" in cell]
-    assert len(cells) > len(known) > 3
+    assert len(known) == len(cells) == 12
     for cell in known:
         figure, low, high = map(float, re.findall(r"-?[\d.]+", cell))
         assert low <= figure <= high
