@@ -283,6 +283,23 @@ def test_other_parameters_are_a_series_of_their_own(tmp_path):
     assert evidence.series_of("cem").label == "CEM"
 
 
+def test_algorithms_of_one_title_are_told_apart_by_their_targets_or_names(tmp_path):
+    store = write_run(tmp_path / "run", ("reuse",))
+    old = next(r for r in store.records() if r.cell.algorithm == "cem")
+    for name, target in (("of-holes", "circular holes"), ("free", "free boundary")):
+        cell = old.cell.model_copy(update={"algorithm": name})
+        record = old.model_copy(update={"cell": cell, "target": target})
+        store.save(record, None, {"id": "machine"})
+    labels = {s.algorithm: s.label for s in Evidence.of(store.folder).series}
+    assert labels["cem"] == "CEM"
+    assert labels["of-holes"] == "CEM (circular holes)"
+    assert labels["free"] == "CEM (free boundary)"
+    twin = old.cell.model_copy(update={"algorithm": "twin"})
+    store.save(old.model_copy(update={"cell": twin}), None, {"id": "machine"})
+    labels = {s.algorithm: s.label for s in Evidence.of(store.folder).series}
+    assert (labels["cem"], labels["twin"]) == ("CEM (cem)", "CEM (twin)")
+
+
 def fdm_record(store, mesh_name, origin, public_program):
     """Save FDM's record on a surface of this origin with this reading; return its key."""
     old = next(r for r in store.records() if r.cell.algorithm == "fdm")

@@ -321,13 +321,16 @@ class Evidence:
             variants.setdefault(name, Counter())[choice] += 1
             about[name] = record
         titles = Counter(record.title for record in about.values())
+        alike = Counter((record.title, record.target) for record in about.values())
         series = []
         for name in sorted(variants, key=lambda n: (self._place(n), n)):
             choices = [choice for choice, _ in variants[name].most_common()]
             for k, choice in enumerate(choices):
                 title, target = about[name].title, about[name].target
-                if titles[title] > 1:
+                if alike[title, target] > 1:
                     title = f"{title} ({name})"
+                elif titles[title] > 1 and target != DISK:
+                    title = f"{title} ({target})"
                 title = in_lists(title)
                 label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
                 series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
