@@ -70,9 +70,8 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
         for label, angles in seen.angles.items()
     }
     maps = zip(frame["mesh_hash"], frame["label"], chosen, strict=True)
-    marks = {origin: mark for origin, (_, mark) in ORIGINS.items()}
     return frame.assign(
-        surface=frame["surface"] + frame["origin"].map(marks),
+        surface=frame["surface"] + frame["origin"].map(lambda origin: ORIGINS[origin][1]),
         policy=frame["solves"].map(evidence.policies.index),
         chosen=chosen,
         below_one=[known.get((place, label)) if one else None for place, label, one in maps],
