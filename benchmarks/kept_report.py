@@ -21,7 +21,7 @@ from cembench.results.report_records import PACKED, RECORDS
 LEFT_OUT = ("energy_history", "phases", "extras", "seconds_calls")
 #: Numbers longer than this many digits, which records are rounded to.
 DIGITS, LONG = 6, re.compile(r"-?\d+\.\d{6,}(?:e[+-]?\d+)?")
-#: JPEGs, and pictures of more bytes, are kept as WebP, of at most so many pixels across.
+#: JPEGs, and PNGs of more bytes, are kept as WebP of this quality, at most so many pixels across.
 LARGE, WIDTH, QUALITY = 200_000, 1200, 70
 #: Hashes, of which a quarter is kept: the first digits name them, and hashes do not pack.
 HASH = re.compile(r"\b([0-9a-f]{16})[0-9a-f]{48}\b")
@@ -65,7 +65,7 @@ def with_few_digits(text: str) -> str:
 
 
 def webp(file: Path) -> bytes:
-    """Return a picture as WebP."""
+    """Return a picture as WebP, made smaller if it is wider than kept ones are."""
     with Image.open(file) as opened:
         picture = opened.convert("RGB")
     picture.thumbnail((WIDTH, 10 * WIDTH))
@@ -97,8 +97,8 @@ def kept_report(report: Path, folder: Path, *, hide: Sequence[Path] = (), run: s
         shutil.rmtree(folder)
     for file in set(FILES.findall(page)):
         (folder / file).parent.mkdir(parents=True, exist_ok=True)
-        large = (report / file).stat().st_size > LARGE
-        if file.endswith(".jpg") or (file.endswith(".png") and large):
+        kind = Path(file).suffix
+        if kind == ".jpg" or (kind == ".png" and (report / file).stat().st_size > LARGE):
             small = Path(file).with_suffix(".webp")
             write_bytes(folder / small, webp(report / file))
             page = page.replace(f"]({file})", f"]({small.as_posix()})")
