@@ -1,5 +1,6 @@
 """A kept report holds what its page shows, and links to nothing that was left out."""
 
+import lzma
 import re
 from pathlib import Path
 
@@ -10,7 +11,7 @@ from PIL import Image
 from benchmarks.kept_report import LEFT_OUT, kept_report, rounded, shortened
 from benchmarks.pages import ROOT
 from cembench.report.pictures import size_of
-from cembench.results.report_records import text_rows
+from cembench.results.report_records import PACKED, text_rows
 
 
 def test_links_to_what_is_left_out_become_plain_text():
@@ -79,3 +80,12 @@ def test_records_of_the_real_surfaces_are_kept_in_short():
     assert all(rounded(value) == value for row in rows for value in row.values())
     assert not set(LEFT_OUT) & set(rows[0])
     assert len(rows) > 1000
+
+
+def test_kept_reports_name_no_folder_of_the_machine_that_made_them():
+    folders = re.compile(r"/(?:tmp|home|root|work|Users)/[\w.-]+")
+    for file in sorted((ROOT / "reports").rglob("*")):
+        if file.suffix in (".md", ".csv", ".json"):
+            assert folders.findall(file.read_text(encoding="utf-8")) == [], file
+        elif file.name == PACKED:
+            assert folders.findall(lzma.decompress(file.read_bytes()).decode()) == [], file

@@ -1,0 +1,57 @@
+"""Valid maps, angle errors and seconds of peers beside ours. From the records of a kept report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+
+from benchmarks.pages import ROOT, Section, Table
+from cembench.results.columns import LIBRARY_MARK, PROGRAM_MARK
+from cembench.results.report_records import text_rows
+
+#: The kept report, and the algorithm of ours that the others are compared with, by target.
+KEPT, BESIDE = ROOT / "reports/peers", {"disk": "direct-cem", "free boundary": "lscm"}
+MARKS = {"program": PROGRAM_MARK, "library": LIBRARY_MARK}
+FIGURES = ["angle", "seconds"]
+#: Degrees below which angle errors count as equal.
+UNSEEN = 0.01
+
+
+def peers_summary(*, report: Path = KEPT) -> Section:
+    """Tabulate each algorithm's valid maps, and its angle errors and seconds over those of ours."""
+    frame = pd.DataFrame(text_rows(report))
+    frame = frame[frame["target"].isin(list(BESIDE))]
+    solved = frame["solve_seconds"].where(frame["solve_seconds"] != "", frame["seconds"])
+    frame = frame.assign(seconds=solved, angle=frame["angle_error_mean_deg"])
+    frame = frame.assign(**{name: pd.to_numeric(frame[name]) for name in FIGURES})
+    frame["angle"] = frame["angle"].clip(lower=UNSEEN)
+    ok = frame[frame["status"] == "ok"]
+    ours = ok[ok["algorithm"] == ok["target"].map(BESIDE)].set_index(["target", "mesh"])[FIGURES]
+    over = ok.set_index(["target", "mesh", "algorithm"])[FIGURES] / ours
+    rows = []
+    for (target, name), group in frame.groupby(["target", "algorithm"]):
+        beside = over.loc[over.index.isin([target], 0) & over.index.isin([name], 2)].dropna()
+        title = group["title"].iloc[0].replace(" (external program)", "")
+        rows.append(
+            {
+                "target": target,
+                "title": f"{title} {MARKS.get(group['external'].iloc[0], '')}".rstrip(),
+                "ok": int((group["status"] == "ok").sum()),
+                "surfaces": len(group),
+                **beside.median().to_dict(),
+                "span": f"{beside['seconds'].min():.2g} to {beside['seconds'].max():.2g}",
+            }
+        )
+    rows.sort(key=lambda row: (row["target"], row["seconds"]))
+    layout = """
+| target | algorithm | valid maps | angle error over ours | seconds over ours | least to most |
+| :--- | :--- | ---: | ---: | ---: | ---: |
+| {target} | {title} | {ok} of {surfaces} | {angle:.2f} | {seconds:.2g} | {span} |"""
+    words = (
+        "Medians over the disks of which both have a valid map. Ours is Direct CEM for maps to the "
+        f"disk, LSCM for a free boundary. Angle errors below {UNSEEN} degrees count as that. "
+        f"{PROGRAM_MARK} program: its solve time counts, not its start; {LIBRARY_MARK} library, "
+        "called in the process."
+    )
+    return Section([words, Table(rows, layout)], "reports/peers/report.md")
