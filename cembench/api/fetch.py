@@ -68,8 +68,8 @@ def fetch(
 
     Each file is fetched once and kept in the cache ($CEMBENCH_CACHE); its SHA-256 must match.
     $CEMBENCH_DATA_URL points to a mirror. A failed download does not stop the others; the same call
-    resumes. The group ict-face has the files of the face model. :func:`cembench.map_files` and
-    :func:`cembench.benchmark` fetch what they need.
+    resumes. The group ict-face has the files of the face model. What takes names of public surfaces
+    fetches those that it needs by itself.
 
     Parameters
     ----------

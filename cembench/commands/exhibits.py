@@ -22,7 +22,7 @@ from cembench.commands.options import DEFAULT_RUN, AddTo
 
 Surfaces = Annotated[
     list[str],
-    typer.Argument(metavar="MESH...", help="Mesh file, or a name from `list surfaces`."),
+    typer.Argument(metavar="MESH", help="Mesh file, or a name from `list surfaces`."),
 ]
 
 

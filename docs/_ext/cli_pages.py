@@ -94,16 +94,16 @@ def _type(one: Any) -> str:
         return "|".join(get_args(literal))
     if issubclass(parts[0], Enum):
         return "|".join(str(choice.value) for choice in parts[0])
-    names = {int: "INTEGER", float: "NUMBER", Path: "PATH"}
-    return names.get(parts[0], "TEXT")
+    return {int: "N", float: "N", Path: "PATH"}.get(parts[0], "NAME")
 
 
 def _meaning(one: Any, context: typer.Context) -> str:
     text = _escaped(" ".join((getattr(one, "help", None) or "").split()))
     default = one.get_default(context, call=False)
     if not getattr(one, "is_flag", False) and default not in (None, [], (), ""):
-        shown = getattr(default, "value", default)
-        text += f" Default: {_code(str(shown))}."
+        several = default if isinstance(default, list | tuple) else [default]
+        shown = ", ".join(str(getattr(value, "value", value)) for value in several)
+        text += f" Default: {_code(shown)}."
     if one.required:
         text += " Required."
     return text.strip()

@@ -82,6 +82,8 @@ def test_the_page_of_the_commands_has_every_verb_and_option(monkeypatch):
                 assert f"`{flag}" in sections[name], f"{flag} of {name}"
     assert "| `--uv unit\\|disk` |" in sections["map"]
     assert "$ cembench map left-hand" in sections["map"]
+    assert "Default: `reuse`." in sections["run"]
+    assert set(re.findall(r"`cembench ([a-z]+)", page)) <= set(verbs)
     sys.modules.pop("cli_pages")
 
 
