@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -516,7 +517,8 @@ def benchmark(
         for mesh in meshes:
             for notice in mesh.notices:
                 reporter.note(f"{mesh.name}: {notice}")
-    with reporter.watching(len(tasks), on_cluster=cluster is not None) as shown:
+    seconds = (None if rounds else options.budget) or inf
+    with reporter.watching(len(tasks), seconds, on_cluster=cluster is not None) as shown:
         records = plan.measure(watcher or shown, same_environment=same_environment)
     return Run(folder, tuple(records), plan)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -129,7 +130,7 @@ def reproduce(
     surfaces, roles = _surfaces(registry, chosen, offline, jobs, reporter)
     settings = MeasurementSettings.until_precise(USUAL_PRECISION)
     tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles)
-    with reporter.watching(len(tasks)) as progress:
+    with reporter.watching(len(tasks), options.budget or inf) as progress:
         records = run_tasks(tasks, Store(folder), options, progress)
     run = Run(folder, tuple(records))
     report = run.report(

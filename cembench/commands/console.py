@@ -13,6 +13,7 @@ import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, NoReturn
 
@@ -203,7 +204,7 @@ class Shown(Reporter):
 
     @contextmanager
     def watching(
-        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+        self, cells: int, budget: float = inf, *, on_cluster: bool = False, resumes: bool = True
     ) -> Iterator[Any]:
         """Show a live table on a terminal, and lines elsewhere; Ctrl-C says how to resume."""
         from cembench.commands.exit_codes import resumable
@@ -214,7 +215,7 @@ class Shown(Reporter):
             with stopping:
                 yield None
             return
-        with stopping, progress_on(err, cells, on_cluster=on_cluster) as progress:
+        with stopping, progress_on(err, cells, budget, on_cluster=on_cluster) as progress:
             yield progress
 
 

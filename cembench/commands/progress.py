@@ -30,9 +30,13 @@ _SHOWN = 12
 
 
 class Remaining:
-    """Estimate of the seconds left: each cell's next process takes as long as its last one."""
+    """Estimate of the seconds left: each cell's next process takes as long as its last one.
 
-    def __init__(self) -> None:
+    It is no more than what is left of the `budget` in seconds, while something is left of it.
+    """
+
+    def __init__(self, budget: float = inf) -> None:
+        self._until = monotonic() + budget
         self.processes = 0
         self.done = 0
         #: So many share what is left.
@@ -71,7 +75,8 @@ class Remaining:
         known = sum(self._left.get(cell, 0) * last for cell, last in self._last.items())
         unknown = self.processes - self.done - sum(self._left.values())
         alone = known + max(unknown, 0) * sum(self._last.values()) / len(self._last)
-        return alone / self.machines
+        estimate, left = alone / self.machines, self._until - monotonic()
+        return min(estimate, left) if left > 0 else estimate
 
 
 class PlainProgress(Watcher):
@@ -80,11 +85,11 @@ class PlainProgress(Watcher):
     #: Seconds without a line after which one says how far the run is.
     EVERY = 60.0
 
-    def __init__(self, console: Console, cells: int) -> None:
+    def __init__(self, console: Console, cells: int, budget: float = inf) -> None:
         self.console = console
         self.cells = cells
         self.finished_cells = 0
-        self.remaining = Remaining()
+        self.remaining = Remaining(budget)
         self._step: Step | None = None
         self._said_at = monotonic()
 
@@ -161,8 +166,8 @@ class LiveProgress(PlainProgress):
 
     EVERY = inf
 
-    def __init__(self, console: Console, cells: int) -> None:
-        super().__init__(console, cells)
+    def __init__(self, console: Console, cells: int, budget: float = inf) -> None:
+        super().__init__(console, cells, budget)
         self._lines: dict[str, tuple[str, str, Text]] = {}
         self._recent: deque[str] = deque(maxlen=_SHOWN)
         self._notice = ""
@@ -221,11 +226,12 @@ class LiveProgress(PlainProgress):
         return Group(table, bar, *([Text(self._notice)] if self._notice else []))
 
 
-def progress_on(console: Console, cells: int, *, on_cluster: bool = False) -> PlainProgress:
+def progress_on(
+    console: Console, cells: int, budget: float = inf, *, on_cluster: bool = False
+) -> PlainProgress:
     """Return the live table on a terminal, and one line per event elsewhere."""
-    if console.is_terminal:
-        return LiveProgress(console, cells)
-    return (PlainOnCluster if on_cluster else PlainProgress)(console, cells)
+    kind = LiveProgress if console.is_terminal else PlainOnCluster if on_cluster else PlainProgress
+    return kind(console, cells, budget)
 
 
 def rounds_left(step: Step) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, nullcontext
+from math import inf
 from typing import Any
 
 
@@ -44,11 +45,11 @@ class Reporter:
         return nullcontext(lambda dataset: None)
 
     def watching(
-        self, cells: int, *, on_cluster: bool = False, resumes: bool = True
+        self, cells: int, budget: float = inf, *, on_cluster: bool = False, resumes: bool = True
     ) -> AbstractContextManager[Any]:
         """Show the progress of `cells` cells during a block, which gets a watcher or None.
 
-        `resumes` says whether the same call resumes the work if it is stopped.
+        `budget` is in seconds; `resumes`: whether the same call resumes the work if it is stopped.
         """
         return nullcontext()
 

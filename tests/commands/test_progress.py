@@ -20,6 +20,19 @@ def test_what_remains_is_judged_by_each_cell_s_last_process():
     assert remaining.seconds == pytest.approx(2 * 1 + 3 * 5.5)
 
 
+def test_no_more_remains_than_of_the_budget_while_something_is_left_of_it(monkeypatch):
+    now = [0.0]
+    monkeypatch.setattr("cembench.commands.progress.monotonic", lambda: now[0])
+    remaining = Remaining(budget=60)
+    remaining.expect(10)
+    remaining.ended("slow", left=9, seconds=10)
+    assert remaining.seconds == 60
+    now[0] = 25.0
+    assert remaining.seconds == 35
+    now[0] = 61.0
+    assert remaining.seconds == 90
+
+
 @pytest.mark.parametrize(("seconds", "said"), [(40, "40 s"), (600, "10 min"), (7200, "2.0 h")])
 def test_durations_are_said_as_a_person_would(seconds, said):
     assert duration(seconds) == said
