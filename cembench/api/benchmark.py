@@ -517,7 +517,7 @@ def benchmark(
         for mesh in meshes:
             for notice in mesh.notices:
                 reporter.note(f"{mesh.name}: {notice}")
-    seconds = (None if rounds else options.budget) or inf
+    seconds = inf if rounds else options.budget or inf
     with reporter.watching(len(tasks), seconds, on_cluster=cluster is not None) as shown:
         records = plan.measure(watcher or shown, same_environment=same_environment)
     return Run(folder, tuple(records), plan)

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from cembench.registry import Registry
 
 #: Degrees below which angle errors count as equal: nobody sees them.
-_UNSEEN = 0.01
+UNSEEN = 0.01
 
 #: What an opened record shows.
 _SHOWN = (
@@ -131,7 +131,7 @@ def _angles(valid: pd.DataFrame, target: str) -> Item:
     # A row an algorithm and surface: machines give the same map, up to rounding.
     once = known.sort_values([ANGLE, "record"]).drop_duplicates(["label", "mesh_hash"])
     least = once.groupby("mesh_hash")[ANGLE].transform("min")
-    once = once.assign(ratio=once[ANGLE].clip(lower=_UNSEEN) / least.clip(lower=_UNSEEN))
+    once = once.assign(ratio=once[ANGLE].clip(lower=UNSEEN) / least.clip(lower=UNSEEN))
     return _compared("angles", f"angles-{slug(target)}", title, once)
 
 
