@@ -45,13 +45,16 @@ def parser_of(study: Callable[..., object]) -> argparse.ArgumentParser:
     for name, parameter in inspect.signature(study, eval_str=True).parameters.items():
         kind, required = parameter.annotation, parameter.default is parameter.empty
         about: dict[str, Any] = {} if required else {"default": parameter.default}
-        about["help"] = "" if required or not parameter.default else "default: %(default)s"
+        text = "" if required or not parameter.default else f"default: {parameter.default}"
+        about["help"] = text.replace("%", "%%")
         if isinstance(kind, types.UnionType):  # X | None
             kind = get_args(kind)[0]
         option = parameter.kind is parameter.KEYWORD_ONLY
         if get_origin(kind) is Sequence:
             kind = get_args(kind)[0]
             about["nargs"] = "+" if option or required else "*"
+            if option:  # `--hide A --hide B` is `--hide A B`, and neither adds to a default
+                about |= {"action": "extend", "default": None}
         if kind is bool:
             about["action"] = "store_true"
         elif get_origin(kind) is Literal:
@@ -90,7 +93,7 @@ def main(arguments: Sequence[str]) -> None:
     asked = vars(parser.parse_args(arguments[1:]))
     write_docs, folder = asked.pop("write_docs"), asked.pop("save")
     started = perf_counter()
-    result = study(**asked)
+    result = study(**{key: value for key, value in asked.items() if value is not None})
     seconds = perf_counter() - started
     sections = [result] if isinstance(result, Section) else list(result)
     print("\n\n".join(map(str, sections)))

@@ -104,12 +104,14 @@ def test_a_signature_becomes_a_command_line():
     ):
         """Study."""
 
-    asked = parser_of(study).parse_args(["a", "b", "--holes", "3", "4", "--folder", "x", "--fast"])
+    words = ["a", "b", "--holes", "3", "--folder", "x", "--holes", "4", "5", "--fast"]
+    asked = parser_of(study).parse_args(words)
     assert vars(asked) == {
         **{"surfaces": ["a", "b"], "rounds": 5, "folder": Path("x"), "clock": "wall"},
-        **{"holes": [3, 4], "fast": True},
+        **{"holes": [3, 4, 5], "fast": True},
     }
     assert parser_of(study).parse_args([]).surfaces == ("1",)
+    assert parser_of(study).parse_args([]).holes is None  # then the study's own default counts
     with pytest.raises(SystemExit):
         parser_of(study).parse_args(["--clock", "sun"])
 
