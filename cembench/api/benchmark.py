@@ -354,7 +354,7 @@ def benchmark(
         Reuse factorisations, factor at every solve, or both.
     backend : str, optional
         The library that factors matrices (default: cvxopt if it is installed, else superlu).
-        cvxopt-metis suits large meshes.
+        cvxopt-metis makes smaller factors of large meshes, in more time.
     threads : int
         Threads of the numerical libraries.
     reference : str, optional

@@ -123,7 +123,7 @@ def map_files(
         Reuse factorisations, or factor at every solve.
     backend : str, optional
         The library that factors matrices (default: cvxopt if it is installed, else superlu).
-        cvxopt-metis suits large meshes.
+        cvxopt-metis makes smaller factors of large meshes, in more time.
     threads : int
         Threads of the numerical libraries.
     timeout : float
