@@ -20,6 +20,7 @@ from benchmarks.measuring import for_measuring
 from benchmarks.origins import record
 from benchmarks.pages import Section, Table
 from benchmarks.stale import PAGE as STATES
+from cembench.commands.exit_codes import stop_on_signals
 from cembench.core.atomic import write_text
 
 HERE = Path(__file__).parent
@@ -120,4 +121,5 @@ if __name__ == "__main__":
     # One thread, and memory as in timed processes: libraries read it when they are loaded.
     if dict(os.environ) != (environment := for_measuring(1)):
         os.execve(sys.executable, [sys.executable, "-m", "benchmarks", *sys.argv[1:]], environment)
+    stop_on_signals()
     main(sys.argv[1:])

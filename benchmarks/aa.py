@@ -16,31 +16,28 @@ from typing import Any, Literal
 
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
-from benchmarks.repeatability import (
-    TWINS,
-    is_called_different,
-    pairs,
-    runs_with_twins,
-    twin_comparisons,
-)
 from cembench.core.atomic import write_text
 from cembench.registry import load_registry
 from cembench.results.comparison import (
     Comparison,
     both_ratios,
+    circumstances,
     compare,
     compare_ratios,
     ratio_interval,
+    references,
 )
 from cembench.results.intervals import ERROR, LOOKS, share, share_of
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import Outcome, Record
+from cembench.results.store import Store
 from cembench.running.map_checks import Checked
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.surfaces import generate_surface
 from cembench.running.timing import CellTimer
 
+TWINS = Path(__file__).with_name("twins.py")
 ALGORITHMS = ("cem", "ldm", "direct-cem", "lscm")
 SURFACES = ("flat-disk", "hemi-ellipsoid", "cone", "spherical-cap", "cylinder-sheet")
 HALVES = {
@@ -107,6 +104,25 @@ def aa(
             text = json.dumps(summarise(measured, names), indent=1)
             write_text(output / f"{half}.json", text)
     return section(output)
+
+
+def runs_with_twins(
+    names: Sequence[str], options: Sequence[str], folder: Path, runs: int
+) -> Iterator[list[Record]]:
+    """Call ``cembench run`` with algorithms and their twins, and yield the records of each run.
+
+    A run measures only what is missing in its folder.
+    """
+    command = [sys.executable, "-m", "cembench.commands.cli", "run", "--json"]
+    command += ["--plugin", str(TWINS)]
+    command += ["-a", ",".join([*names, *(f"{name}-twin" for name in names)]), *options]
+    for seed in progress(range(runs), "run"):
+        place = folder / f"run-{seed:02d}"
+        one = [*command, "--seed", str(seed), "-o", str(place)]
+        ended = subprocess.run(one, check=False, stdout=subprocess.DEVNULL)
+        if ended.returncode not in (0, 1):  # 1: a cell did not end ok, and is left out
+            sys.exit(f"run {seed + 1} ended with code {ended.returncode}")
+        yield Store(place).records()
 
 
 def shared_run(
@@ -177,6 +193,24 @@ def summarise(runs: Sequence[Sequence[Record]], names: Sequence[str]) -> dict[st
         "median_difference": median(apart) if apart else None,
         "largest_difference": max(apart, default=None),
     }
+
+
+def twin_comparisons(records: Sequence[Record], names: Sequence[str]) -> list[Comparison]:
+    """Return the comparisons of algorithms with their twins on every surface of a run."""
+    both = [pair for name in names for pair in pairs(records, f"{name}-twin", name)]
+    return [one for pair in both if (one := compare(*pair)) is not None]
+
+
+def is_called_different(comparison: Comparison) -> bool:
+    """Whether one of the two was called faster or slower."""
+    return comparison.verdict in ("faster", "slower")
+
+
+def pairs(records: Sequence[Record], name: str, base: str) -> list[tuple[Record, Record]]:
+    """Return the records of one algorithm, each with that of the other on the same surface."""
+    known = references(records, base)
+    chosen = [r for r in records if r.cell.algorithm == name]
+    return [(r, known[circumstances(r.cell)]) for r in chosen if circumstances(r.cell) in known]
 
 
 def _counted(tables: Sequence[Sequence[Comparison]]) -> dict[str, Any]:

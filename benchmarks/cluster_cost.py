@@ -51,7 +51,7 @@ def cluster_cost(*, cells: int = 2000) -> Section:
     kernels = _kernels(records) - _kernels(alone)
     seconds = {"workers": cluster, "local": local, "more": cluster - local, "kernels": kernels}
     each = {name: 1000 * one / len(tasks) for name, one in seconds.items()}
-    return Section([Table([{"cells": len(tasks), **each}], LAYOUT)])
+    return Section([Table([{"cells": len(tasks), **each}], LAYOUT)], "docs/cluster.md")
 
 
 def _tasks(surfaces: int, name: str) -> list[Task]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 from cembench.algorithms.cem import cem
@@ -14,22 +13,22 @@ from cembench.algorithms.ldm import ldm
 from cembench.algorithms.qiem import qiem
 from numpy.typing import NDArray
 
+from benchmarks.disks import disk_of
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
 from cembench import AlgorithmFailed, DiskMesh, Parameterization
 from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_triangles, image_area
-from cembench.mesh.files import read_mesh
 from cembench.morphing.align import to_centre
 
 PAPER = {"CEM": cem, "FDM": fdm, "LDM": ldm, "QIEM": qiem}
 #: What is compared, by the parameters besides the weights.
 CALLS: dict[str, Callable[..., Parameterization]] = {
     **PAPER,
-    "CEM 200": partial(cem, max_iterations=200, tolerance=0, stop="change"),
-    "direct": direct_cem,
-    "direct, back=0": partial(direct_cem, back=0),
+    "CEM, 200 iterations": partial(cem, max_iterations=200, tolerance=0, stop="change"),
+    "Direct CEM": direct_cem,
+    "Direct CEM, `back=0`": partial(direct_cem, back=0),
 }
 #: With the weights of each method's paper, and with intrinsic Delaunay weights, marked D.
 METHODS = {
@@ -38,42 +37,71 @@ METHODS = {
     for name, call in CALLS.items()
 }
 FIGURES = ("angle", "mu", "energy")
-OTHERS = [name for name in METHODS if name not in PAPER]
+#: The columns of the first table: direct CEM with each weights, and without the way back.
+SHOWN = {
+    "own weights": "Direct CEM",
+    "Delaunay": "Direct CEM D",
+    "Delaunay, `back=0`": "Direct CEM, `back=0` D",
+}
+_FIRST, *_OTHERS = ("mean angle", "mean \\|mu\\|", "E_C")
 RATIOS = f"""
-| surface | figure | {" | ".join(OTHERS)} |
-|---|---|{"---:|" * len(OTHERS)}
-| {{surface}} | {{figure}} | {" | ".join(f"{{ratios[{name}]:.3f}}" for name in OTHERS)} |"""
-SUMMARY = """
-| method | figure | surfaces | geometric mean | worst | within 1 % |
-|---|---|---:|---:|---:|---:|
-| {method} | {figure} | {surfaces} | {mean:.3f} | {worst:.3f} | {near} |"""
+| surface | triangles | {_FIRST}: {" | ".join(SHOWN)} | {
+    " | ".join(f"{what}: {' | '.join(SHOWN)}" for what in _OTHERS)
+} |
+|---|{"---:|" * (1 + len(FIGURES) * len(SHOWN))}
+| {{surface}} | {{faces:,}} | {
+    " | ".join(f"{{{figure}[{name}]:.3f}}" for figure in FIGURES for name in SHOWN.values())
+} |"""
+SUMMARY = f"""
+| method | weights | {_FIRST} | {" | ".join(_OTHERS)} |
+|---|---|---:|---:|---:|
+| {{method}} | {{weights}} | {
+    " | ".join(
+        f"{{{figure}[mean]:.3f}}, {{{figure}[worst]:.3f}}, {{{figure}[near]}}" for figure in FIGURES
+    )
+} |"""
 
 
-def direct_cem_quality(meshes: Sequence[Path]) -> Section:
+def direct_cem_quality(surfaces: Sequence[str]) -> Section:
     """Compare direct CEM with the other disk maps, each with both kinds of weights.
 
-    For every surface the mean angle error, the mean of |mu| over the surface's area and the
-    conformal energy of each method, as multiples of the best of CEM, FDM, LDM and QIEM with the
-    weights of their papers; then geometric means, worst cases and how many are within 1 %. Methods
-    with intrinsic Delaunay weights are marked D. Energies are compared in one gauge, the surface's
-    area centred in the disk, with the surface's own cotangents.
+    For every surface, a mesh file or NAME@TRIANGLES for a generated one, the mean angle error, the
+    mean of |mu| over the surface's area and the conformal energy of each method, as multiples of
+    the best of CEM, FDM, LDM and QIEM with the weights of their papers; then geometric means, worst
+    cases and how many are within 1 % of that best. Energies are compared in one gauge, the
+    surface's area centred in the disk, with the surface's own cotangents.
     """
-    rows = []
-    for path in progress(meshes):
-        surface = read_mesh(path)
-        measured = ratios(DiskMesh.from_arrays(surface.V, surface.F))
-        for k, figure in enumerate(FIGURES):
-            both = {name: measured[name][k] if name in measured else None for name in METHODS}
-            rows.append({"surface": path.stem, "figure": figure, "ratios": both})
-    summary = []
-    for name in METHODS:
-        for figure in FIGURES:
-            some = [one["ratios"][name] for one in rows if one["figure"] == figure]
-            x = np.array([ratio for ratio in some if ratio is not None])
-            mean, near = np.exp(np.log(x).mean()), (x < 1.01).sum()
-            summary.append({"method": name, "figure": figure, "surfaces": len(x), "mean": mean,
-                            "worst": x.max(), "near": near})  # fmt: skip
-    return Section([Table(rows, RATIOS), Table(summary, SUMMARY)])
+    meshes = [disk_of(one) for one in surfaces]
+    measured = [ratios(mesh) for mesh in progress(meshes, "surface")]
+    rows = [
+        {"surface": mesh.name, "faces": mesh.m}
+        | {
+            figure: {n: one[n][k] if n in one else None for n in SHOWN.values()}
+            for k, figure in enumerate(FIGURES)
+        }
+        for mesh, one in zip(meshes, measured, strict=True)
+    ]
+    summary = [
+        {"method": name, "weights": weights}
+        | {
+            figure: standing([one[name + mark][k] for one in measured if name + mark in one])
+            for k, figure in enumerate(FIGURES)
+        }
+        for name in CALLS
+        for weights, mark in (("own", ""), ("Delaunay", " D"))
+    ]
+    how = "Each figure: the geometric mean, the worst, and on how many surfaces it is within 1 %."
+    return Section([Table(rows, RATIOS), how, Table(summary, SUMMARY)], "docs/direct_cem.md")
+
+
+def standing(multiples: Sequence[float]) -> dict[str, float]:
+    """Return the geometric mean of some multiples of the best, the worst, and how many are near."""
+    x = np.array(multiples)
+    return {
+        "mean": float(np.exp(np.log(x).mean())),
+        "worst": float(x.max()),
+        "near": int((x < 1.01).sum()),
+    }
 
 
 def figures(mesh: DiskMesh, uv: NDArray[np.complex128]) -> tuple[float, float, float]:

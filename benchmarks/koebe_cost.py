@@ -15,7 +15,8 @@ FACTORING = (
     *("ordering", "symbolic", "factorisation", "dense factorisation", "condensation", "patches"),
 )
 LAYOUT = """
-| faces | holes | rim | koebe s | more s | apart s | factoring | apart | ratio |
+| triangles | holes | on boundaries | first sweep | each further one | factorised apart \
+| factoring | apart | ratio |
 |---:|---:|---:|---:|---:|---:|---:|---:|---:|
 | {faces:,} | {holes} | {rim} | {koebe:.3f} | {more:.3f} | {apart:.3f} | {factoring:.3f} \
 | {factoring_apart:.3f} | {ratio:.2f} |"""
@@ -43,8 +44,8 @@ def koebe_cost(
     if len(rows) > 2 and not meshes:
         x, y = zip(*((log(one["holes"] + 1), log(one["koebe"])) for one in rows), strict=True)
         power = linear_regression(x, y).slope
-        parts.append(f"seconds grow as the number of boundaries to the power {power:.2f}")
-    return Section(parts)
+        parts.append(f"Seconds grow as the number of boundaries to the power {power:.2f}.")
+    return Section(parts, "docs/holes.md")
 
 
 def measure(rounds: int, faces: int, holes: int, mesh: str | None) -> dict[str, Any]:

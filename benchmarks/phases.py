@@ -67,5 +67,6 @@ def phases(
 | algorithm | solves |{"".join(f" {name} |" for name in shown)} rest | total |
 |---|---|{"---:|" * (len(shown) + 2)}
 | {{title}} | {{solves}} |{cells} {{rest:.3f}} | {{total:.3f}} |"""
-    about = f"{surface.name}: {surface.m:,} triangles, {surface.n:,} vertices; seconds"
-    return Section([about, Table(rows, layout)])
+    about = f"{surface.name}: {surface.m:,} triangles, {surface.n:,} vertices; seconds of the call "
+    about += f"with the median total of {repeats}."
+    return Section([about, Table(rows, layout)], "docs/speed.md")

@@ -37,7 +37,6 @@ LONG = (
     "api/test_api.py",
     "mesh/test_unpacking.py",
     "algorithms/test_published.py",
-    "benchmarks/test_repeatability.py",
     "report/test_html_browser.py",
     "submissions/test_results_repository.py",
 )

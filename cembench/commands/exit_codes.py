@@ -103,7 +103,7 @@ def ending() -> Iterator[None]:
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream may not support this
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
-    before = _stop_on_signals()
+    before = stop_on_signals()
     try:
         try:
             yield
@@ -172,7 +172,7 @@ def _forget_output() -> None:
     os.close(nowhere)
 
 
-def _stop_on_signals() -> dict[int, Any]:
+def stop_on_signals() -> dict[int, Any]:
     """Make SIGTERM and SIGHUP unwind like Ctrl-C, so that temporary folders are removed.
 
     An ignored signal (``nohup``) stays ignored; a second signal does not interrupt the cleanup.

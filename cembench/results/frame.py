@@ -145,6 +145,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "percentile": _figure(_percentile),
         "smallest": _figure(np.min),
         "largest": _figure(np.max),
+        "at_least": lambda of, least: of.clip(lower=least),
         "geometric": _figure(geometric),
         "geometric_rate": _figure(lambda rates: geometric(1 + rates) - 1),
         "at_largest": _at_largest,

@@ -1,7 +1,10 @@
 import json
+import signal
 import subprocess
 import sys
+import time
 
+import psutil
 import pytest
 
 from benchmarks import aa
@@ -43,6 +46,26 @@ def test_busy_loops_end_with_the_block():
             _fail_beside(2, started)
     assert all(process.poll() is not None for process in started)
     assert started[0].args[0] == sys.executable
+
+
+@pytest.mark.slow
+def test_a_stopped_study_leaves_nothing_running_and_goes_on_when_called_again(tmp_path):
+    command = [sys.executable, "-m", "benchmarks", "aa", "--busy", "1", "--runs", "1"]
+    command += ["--surfaces", "flat-disk", "--faces", "100", "--algorithms", "cem,lscm"]
+    command += ["--output", str(tmp_path)]
+    started = subprocess.Popen(
+        command, preexec_fn=lambda: signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    )
+    while not list(tmp_path.glob("busy/run-00/samples/*/*.jsonl")):
+        assert started.poll() is None
+        time.sleep(0.1)
+    below = psutil.Process(started.pid).children(recursive=True)
+    assert len(below) >= 3  # the loop, the run and its timed process
+    started.terminate()
+    assert started.wait() == 128 + signal.SIGTERM
+    assert not psutil.wait_procs(below, timeout=10)[1]
+    again = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert "| beside a busy neighbour | 1 | 2 |" in again.stdout
 
 
 def _fail_beside(number, started):

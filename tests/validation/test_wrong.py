@@ -55,7 +55,10 @@ def test_the_right_check_catches_it(name):
 
 @pytest.mark.parametrize(
     "name",
-    ["lscm", *(pytest.param(name, marks=pytest.mark.slow) for name in ("fdm", "ldm", "qiem"))],
+    [
+        *("lscm", "direct-cem"),
+        *(pytest.param(name, marks=pytest.mark.slow) for name in ("cem", "fdm", "ldm", "qiem")),
+    ],
 )
 def test_the_built_in_conformal_maps_are_right(name):
     assert [f.measured for f in examined(name, None) if not f.ok] == []
@@ -66,7 +69,8 @@ def test_the_built_in_conformal_maps_are_right(name):
     "name",
     [
         *("scp", "bff", "bff-free", "cetm", "cetm-free", "cetm-flips", "abf-linear", "abf++"),
-        *("circle-packing", "angenent-haker", "gu-yau", "harmonic-tutte", "mean-value"),
+        *("circle-packing", "angenent-haker", "gu-yau", "harmonic-tutte", "mean-value", "best"),
+        *("cetm-flips-overlay", "koebe-cem", "direct-cem-holes", "best-holes"),
     ],
 )
 def test_the_families_of_the_field_are_right(name):
