@@ -48,7 +48,7 @@ def cluster_cost(*, cells: int = 2000) -> Section:
         before = _cpu_seconds()
         alone = run_tasks(tasks, Store(place / "local"))
         local = _cpu_seconds() - before
-    kernels = _kernels(records) - _kernels(alone)
+    kernels = _kernels(records, COUNT) - _kernels(alone, len(tasks))
     seconds = {"workers": cluster, "local": local, "more": cluster - local, "kernels": kernels}
     each = {name: 1000 * one / len(tasks) for name, one in seconds.items()}
     return Section([Table([{"cells": len(tasks), **each}], LAYOUT)], "docs/cluster.md")
@@ -61,12 +61,12 @@ def _tasks(surfaces: int, name: str) -> list[Task]:
     return plan_cells(chosen, meshes, {}, MeasurementSettings(), [PLUGIN])
 
 
-def _kernels(records: Sequence[Record]) -> float:
-    """CPU seconds that the reference kernel took, by what it takes in this process now."""
+def _kernels(records: Sequence[Record], processes: int) -> float:
+    """CPU seconds of the reference kernels of rounds of `processes`, by what they take now."""
     count = len({(r.sitting, r.kernel_seconds) for one in records for r in one.outcome.rounds})
     began = process_time()
     for _ in range(10):
-        kernel_seconds()
+        kernel_seconds(processes)
     return count * (process_time() - began) / 10
 
 
