@@ -27,7 +27,7 @@ LAYOUT = """
 def fold_repairs(folders: Sequence[Path], *, faces: int = 100_000) -> Section:
     """Tabulate every map of the disks below some folders that has folds before it is repaired.
 
-    A repair that costs too much is refused: its map is counted as it would have been.
+    A repair that costs too much is refused; the figures after it are those of the refused map.
     """
     disks = list(disks_below(folders, faces))
     return Section(
