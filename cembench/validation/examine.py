@@ -27,6 +27,7 @@ from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
+    maps_each,
     quality_findings,
     together,
     without_map,
@@ -113,6 +114,7 @@ def examine(
     findings: list[ValidationFinding] = []
     skipped: dict[Stage, str] = {}
     parts: dict[str, Any] = {}
+    measured: list[Record] = []
     for stage, examined in _STAGES.items():
         fault = next((finding.stage for finding in findings if not finding.ok), None)
         if not _is_asked(stage, asked):
@@ -121,9 +123,10 @@ def examine(
             skipped[stage] = f"not examined, because of a fault in {fault}"
         else:
             work.hooks.stage(stage)
-            checked, figures = examined(work)
+            checked, figures, records = examined(work)
             findings += checked
             parts |= figures
+            measured += records
     validation = Validation(
         algorithm=algorithm.name,
         title=algorithm.title,
@@ -135,6 +138,8 @@ def examine(
         environment=describe_environment()["id"],
         findings=tuple(findings),
         skipped=skipped,
+        folds_on=tuple(folds_on(measured)),
+        no_map_on=without_map(measured),
         not_asked_for=tuple(stage for stage in skipped if not _is_asked(stage, asked)),
         seconds=monotonic() - started,
         **parts,
@@ -170,6 +175,10 @@ class _Work:
     def kind(self) -> type[TriangleMesh]:
         return surfaces.mesh_kind(self.solver.algorithm)
 
+    def ours(self, records: Sequence[Record]) -> list[Record]:
+        """Return the records of the algorithm that is examined."""
+        return [record for record in records if record.cell.algorithm == self.name]
+
     def measured(
         self, stage: Stage, meshes: Sequence[TriangleMesh], beside: Sequence[str], rounds: int
     ) -> list[Record]:
@@ -184,28 +193,28 @@ class _Work:
             return run_tasks(tasks, Store(self.folder / stage), options, watcher)
 
 
-_Found = tuple[list[ValidationFinding], dict[str, Any]]
+#: What a stage finds, its figures, and its records of our algorithm.
+_Found = tuple[list[ValidationFinding], dict[str, Any], list[Record]]
 
 
 def _contract(work: _Work) -> _Found:
-    return examine_contract(work.solver, work.registry), {}
+    return examine_contract(work.solver, work.registry), {}, []
 
 
 def _correctness(work: _Work) -> _Found:
-    return examine_correctness(work.solver, work.registry), {}
+    return examine_correctness(work.solver, work.registry), {}, []
 
 
 def _quality(work: _Work) -> _Found:
     meshes = list(work.asked.meshes)
     meshes = meshes or surfaces.compared(work.registry, work.kind, work.asked.faces)
     records = work.measured("quality", meshes, work.baselines, work.asked.rounds)
-    ours = [record for record in records if record.cell.algorithm == work.name]
-    return quality_findings(ours), {
+    ours = work.ours(records)
+    figures = {
         "surfaces": tuple(mesh.name for mesh in meshes),
-        "folds_on": tuple(folds_on(ours)),
-        "no_map_on": without_map(ours),
         "against": together([comparison_with(records, work.name, b) for b in work.baselines]),
     }
+    return quality_findings(ours), figures, ours
 
 
 def _scaling(work: _Work) -> _Found:
@@ -215,15 +224,17 @@ def _scaling(work: _Work) -> _Found:
     beside = (reference,) if known else ()
     started = monotonic()
     sittings = [work.measured("scaling", meshes, beside, FIRST_ROUNDS)]
+    ours = work.ours(sittings[0])
+    mapped = maps_each("scaling", ours)
     while True:
         growth = growth_of(sittings, work.name, beside[0] if beside else None)
         if growth is None:
-            return [scales(None)], {}
+            return [mapped, scales(None)], {}, ours
         two_largest = set(largest_two(sittings[0], work.name))
         again = [record for record in sittings[-1] if record.cell.mesh in two_largest]
         more = more_rounds(growth, monotonic() - started, seconds_a_round(again))
         if not more:
-            return [scales(growth)], {"growth": growth}
+            return [mapped, scales(growth)], {"growth": growth}, ours
         largest = [mesh for mesh in meshes if mesh.name in two_largest]
         sittings.append(work.measured("scaling", largest, beside, more))
 

@@ -32,7 +32,7 @@ from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record
-from cembench.validation.finding import ValidationFinding, finding
+from cembench.validation.finding import Stage, ValidationFinding, finding
 
 #: Ratios this close to 1 are ties.
 TIE = 0.01
@@ -104,7 +104,7 @@ class BaselineComparison(BaseModel):
 
     baseline: str
     title: str
-    #: Whether energies are divided by the image's area: targets differ, or its size is free.
+    #: Whether energies are divided by the image's area: unless both images are the unit disk.
     relative: bool
     #: Whether energies are those in the common gauge: both are disks and the records have them.
     common_gauge: bool = False
@@ -139,9 +139,8 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     if not names:
         raise ValueError(f"no surface has records of both {ours!r} and {baseline!r}")
     one, other = next(iter(mine.values())), next(iter(theirs.values()))
-    # External code chooses the size of a free image itself.
-    free = one.target == "free boundary" and (one.external, other.external) != (None, None)
-    relative = one.target != other.target or free
+    # The size of an image that is not the unit disk is free.
+    relative = (one.target, other.target) != ("disk", "disk")
     gauge = not relative and all(_has_gauge(r) for n in names for r in (mine[n], theirs[n]))
     verdicts = _verdicts([(mine[name], theirs[name]) for name in names])
     pairs = tuple(
@@ -245,7 +244,7 @@ def without_map(records: Sequence[Record]) -> dict[str, str]:
     return {r.cell.mesh: r.outcome.cause or "" for r in records if _has_none(r)}
 
 
-def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
+def maps_each(stage: Stage, records: Sequence[Record]) -> ValidationFinding:
     """Check that each record has a map, a map with folds, or a failure with a cause."""
     bad = [
         f"{r.cell.mesh}: {r.outcome.status}: {r.outcome.cause}"
@@ -253,28 +252,24 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
         if r.outcome.status != "ok" and not _only_folds(r) and not _has_none(r)
     ]
     none = len(without_map(records)) == len(records)
+    right = f"no map on any of {len(records)} surfaces" if none else "a map or a cause on each"
+    return finding(stage, "every surface", "; ".join(bad) or right, ok=not bad and not none)
+
+
+def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
+    """Check that each record has a map or a cause, and the same one in every round."""
     changing = [
         r.cell.mesh for r in records if of_kind(NoticeKind.NOT_DETERMINISTIC, r.outcome.notes)
     ]
-    return [
-        finding(
-            "quality",
-            "every surface",
-            "; ".join(bad)
-            or (
-                f"no map on any of {len(records)} surfaces" if none else "a map or a cause on each"
-            ),
-            ok=not bad and not none,
-        ),
-        finding(
-            "quality",
-            "repeatable in every round",
-            f"different bits in a later call on {', '.join(changing)}"
-            if changing
-            else "the same bits in every round",
-            ok=not changing,
-        ),
-    ]
+    repeated = finding(
+        "quality",
+        "repeatable in every round",
+        f"different bits in a later call on {', '.join(changing)}"
+        if changing
+        else "the same bits in every round",
+        ok=not changing,
+    )
+    return [maps_each("quality", records), repeated]
 
 
 def _pair(

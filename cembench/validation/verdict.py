@@ -168,7 +168,10 @@ def _meets(requirement: Requirement, validation: Validation) -> bool:
 
 
 def _meets_against(requirement: Requirement, against: BaselineComparison) -> bool:
+    """Whether it is met on the surfaces, of which we map all that the baseline maps."""
     energy, speed = against.energy, against.speed
+    if any(pair.energy is None and pair.baseline_energy is not None for pair in against.pairs):
+        return False
     if requirement is Requirement.faster:
         return speed is not None and speed.verdict == "faster"
     if requirement is Requirement.not_slower:

@@ -74,6 +74,13 @@ def test_energies_of_different_targets_are_divided_by_the_area():
     assert comparison.pairs[0].energy == pytest.approx(0.01 / 3.14)
 
 
+def test_a_smaller_image_of_free_size_is_no_lower_energy():
+    small = {"conformal_energy": 1e-6, "image_area": 3.14e-4}
+    free = {"target": "free boundary"}
+    records = [record("ours", "s", metrics=small, **free), record("lscm", "s", 0.01, **free)]
+    assert comparison_with(records, "ours", "lscm").energy.equal == 1
+
+
 def test_speed_is_judged_over_rounds_paired_on_every_surface():
     slow_rounds = [1, 1, 5, 1, 1, 1]
     records = [record("ours", name, seconds=[0.5 * t for t in slow_rounds]) for name in "ab"]

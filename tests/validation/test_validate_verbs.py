@@ -70,10 +70,20 @@ def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
     code, out, _ = here("folds-sometimes", *named, "--up-to", 0, *required, "--json")
     data = json.loads(out)
     assert data["verdict"].endswith(
-        "folds on 1 surface: flat-disk; no map of 1 surface: cone; required and not met: no-folds"
+        "folds on 1 surface: flat-disk; no map of 1 surface: cone; "
+        "required and not met: no-folds, not-worse"
     )
     assert data["no_map_on"] == {"cone": "no cones"}
     assert (data["valid"], data["passed"], code) == (True, False, 1)
+
+
+def test_what_crashes_on_large_surfaces_is_invalid(here):
+    code, out, _ = here("crashes-on-large", *TINY, "--up-to", 9900, "--json")
+    data = json.loads(out)
+    assert code == 1
+    assert data["verdict"].startswith("invalid: every surface: ")
+    assert "too large" in data["verdict"]
+    assert next(f["stage"] for f in data["findings"] if not f["ok"]) == "scaling"
 
 
 def test_what_remembers_its_calls_is_caught_in_the_rounds(here):

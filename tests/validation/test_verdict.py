@@ -5,7 +5,7 @@ from rich.console import Console
 
 from cembench.validation.document import validation_text
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 
 
@@ -124,6 +124,15 @@ def test_requirements(asked, met):
         assert (unmet([asked], validation(against=(one,))) == ()) == (one in met)
     assert unmet([asked, asked], validation(against=(GOOD, BAD))) == (asked,)
     assert unmet([asked], validation()) == (asked,)
+
+
+@pytest.mark.parametrize("asked", [one for one in Requirement if one is not Requirement.no_folds])
+def test_a_requirement_is_not_met_where_the_baseline_alone_has_a_map(asked):
+    pair = dict.fromkeys(Pair.model_fields) | {"surface": "cone", "faces": 9, "records": ("a", "b")}
+    for ours, theirs, met in [(None, 0.1, False), (0.1, None, True), (None, None, True)]:
+        pairs = (Pair(**pair | {"energy": ours, "baseline_energy": theirs}),)
+        one = validation(against=(GOOD.model_copy(update={"pairs": pairs}),))
+        assert (unmet([asked], one) == ()) is met
 
 
 def test_a_requirement_that_is_not_met_is_told():

@@ -191,6 +191,13 @@ def folds_sometimes(mesh: DiskMesh) -> Parameterization:
     return fold(mesh) if mesh.name == "flat-disk" else right_one(mesh)
 
 
+@algorithm("crashes-on-large", title="Crashes on large surfaces", target="disk")
+def crashes_on_large(mesh: DiskMesh) -> Parameterization:
+    if mesh.m > 7000:
+        raise IndexError("too large")
+    return right_one(mesh)
+
+
 @algorithm("hangs", title="Never ends", target="disk")
 def hangs(mesh: DiskMesh) -> Parameterization:
     time.sleep(600)
