@@ -6,11 +6,12 @@ import csv
 import json
 from collections import Counter
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from benchmarks.pages import ROOT, Section, Table
-from cembench.results.families import rate_interval
+from cembench.results.families import enough_rounds, rate_interval
 from cembench.results.multiple_testing import geometric
 from cembench.results.report_records import PACKED, RECORDS, text_rows
 
@@ -28,47 +29,41 @@ def averages(file: Path) -> dict[str, dict[str, str]]:
     return {row["reading"]: row for row in _rows(file)}
 
 
-def ratios(report: Path, algorithm: str, policy: str) -> list[list[float]]:
-    """Return t / t_CEM of each round, for every model of the paper once.
+def rates(report: Path, algorithm: str, policy: str) -> dict[str, dict[str, Any]]:
+    """Return the records of an algorithm with its rates of speedup, for every model once.
 
     A model that was measured itself counts, and not its stand-in; of a method with several sets of
     parameters the one that was measured on most surfaces.
     """
-    there = [row for row in text_rows(report) if row["solves"] == policy and row["status"] == "ok"]
-    counts = Counter((row["algorithm"], row["parameters"]) for row in there)
-    rows: dict[tuple[str, str], dict[str, dict[str, str]]] = {}
-    for row in sorted(there, key=lambda row: counts[row["algorithm"], row["parameters"]]):
-        if row["paper_row"] and row["seconds"]:
-            rows.setdefault((row["paper_row"], row["origin"]), {})[row["algorithm"]] = row
-    both = {
-        model: _paired(by[algorithm], by["cem"])
-        for (model, _), by in sorted(rows.items(), key=lambda one: one[0][1] == "model")
-        if algorithm in by and "cem" in by
-    }
-    return list(both.values())
-
-
-def _paired(row: dict[str, str], base: dict[str, str]) -> list[float]:
-    """Return the ratios of the rounds; older records hold the seconds alone."""
-    if row.get("ratios"):
-        return list(map(float, json.loads(row["ratios"])))
-    ours, theirs = (json.loads(one["seconds_raw"]) for one in (row, base))
-    return [a / b for a, b in zip(ours, theirs, strict=False)]
+    own = [
+        row
+        for row in text_rows(report)
+        if (row["solves"], row["algorithm"]) == (policy, algorithm)
+        and row["paper_row"]
+        and row["speedup"]
+    ]
+    counts = Counter(row["parameters"] for row in own)
+    own.sort(key=lambda row: (row["origin"] == "model", counts[row["parameters"]]))
+    return {row["paper_row"]: row for row in own}
 
 
 def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
     if not {PACKED, RECORDS} & {file.name for file in report.iterdir()}:
         return ""
-    rate = rate_interval(ratios(report, algorithm, policy), log=reading == GEOMETRIC)
+    rows = rates(report, algorithm, policy).values()
+    if not enough_rounds([len(json.loads(row["ratios"] or "[]")) for row in rows]):
+        return ""
+    ratios = [1 + float(row["speedup"]) for row in rows]
+    rate = rate_interval(ratios, [row["family"] for row in rows], log=reading == GEOMETRIC)
     return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
 def readme_speedups(*, report: Path = KEPT) -> Section:
     """Tabulate how much faster CEM is, from the tables of a report and its records.
 
-    Averages have a 95 % interval over the surfaces (Student's, as in the report's table of
-    certainty) where most cells have the rounds for one.
+    Averages have a 95 % interval over the models, those of one family together, where most cells
+    have the rounds for one.
     """
     files = {policy: report / "tables" / file for policy, file in POLICIES.items()}
     by_policy = {policy: averages(file) for policy, file in files.items() if file.exists()}

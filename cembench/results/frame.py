@@ -20,7 +20,13 @@ import numpy as np
 
 from cembench.core.errors import ParameterError
 from cembench.results.columns import significant
-from cembench.results.families import average_interval, family_means, share_interval, votes
+from cembench.results.families import (
+    average_interval,
+    family_means,
+    rate_interval,
+    share_interval,
+    votes,
+)
 from cembench.results.multiple_testing import corrected, geometric, sign_test
 
 if TYPE_CHECKING:
@@ -117,6 +123,11 @@ def _family_interval(of: pd.Series, families: pd.Series) -> str | None:
     return f"{interval.low:.2f} to {interval.high:.2f}" if interval else None
 
 
+def _rate_interval(of: pd.Series, families: pd.Series) -> str | None:
+    interval = rate_interval(list(1 + of), list(families), log=False)
+    return f"{interval.low:.1f} to {interval.high:.1f}" if interval else None
+
+
 def _percentile(known: Any, q: float) -> float:
     return float(np.percentile(known, q))
 
@@ -138,6 +149,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "family_percentile": _family_percentile,
         "family_geometric": _family_geometric,
         "family_interval": _family_interval,
+        "rate_interval": _rate_interval,
         "wins": _wins,
         "corrected": _corrected,
         "mean": _figure(np.mean),

@@ -240,6 +240,8 @@ class Paper(_Part):
     stated: Mapping[Literal["rate", "saving"], Mapping[str, float]] = {}
     #: Models that are registered surfaces, at the printed number of triangles, or public meshes.
     surfaces: Mapping[str, str] = {}
+    #: Models that show one object: their surfaces count as one in intervals.
+    families: Mapping[str, tuple[str, ...]] = {}
     #: Notes on the table of factorisations and solves, with expressions over the frame in braces.
     work_notes: tuple[str, ...] = ()
     pictures: tuple[Picture, ...] = ()
@@ -294,6 +296,10 @@ class Paper(_Part):
         """Return the model that a surface of this name and size is by `surfaces`, or ""."""
         named = (model for model, name in self.surfaces.items() if name == surface)
         return next((model for model in named if self.faces(model) == faces), "")
+
+    def object_of(self, model: str) -> str:
+        """Return what a model shows: the name of its family, or its own."""
+        return next((name for name, held in self.families.items() if model in held), model)
 
     def plotted(self, plot: str) -> PlottedFigure:
         """Return the figure that is plotted in this way; an empty one if there is none."""
@@ -445,6 +451,7 @@ def _check(paper: Paper) -> None:
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
     named += [model for one in paper.exhibits for model in one.models]
+    named += [model for held in paper.families.values() for model in held]
     for model in named:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"

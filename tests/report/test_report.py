@@ -131,7 +131,7 @@ def test_the_first_screen_of_every_form_has_the_paper_and_all_verdicts(written):
         head = " ".join(text.split())
         assert CITATION.authors in head
         assert f"doi:{CITATION.doi}" in head
-        assert "CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; here " in head
+        assert "CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1 over all models, " in head
         assert f"Of {len(claims)} claims of the paper, " in head
     failing = next(part for part in report.findings.sentences[1] if isinstance(part, Claim))
     assert f'<a href="#{failing.name}">{failing.title}</a>' in forms[0]

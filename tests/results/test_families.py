@@ -15,6 +15,7 @@ from benchmarks.family_intervals import (
 )
 from cembench.results.families import (
     average_interval,
+    enough_rounds,
     family_means,
     rate_interval,
     share_interval,
@@ -50,14 +51,24 @@ def test_the_interval_of_an_average_is_students():
 
 
 def test_the_interval_of_a_rate_is_that_of_the_average_less_one_and_needs_rounds():
-    rng = np.random.default_rng(2)
-    rounds = [[3.0 * s * f for f in rng.lognormal(0, 0.01, 6)] for s in rng.lognormal(0, 0.3, 8)]
-    interval = rate_interval(rounds, log=False)
-    whole = average_interval([float(np.median(r)) for r in rounds], log=False)
-    assert (interval.low, interval.high) == pytest.approx((whole.low - 1, whole.high - 1))
-    assert rate_interval([r[:5] for r in rounds], log=False) is None
-    assert rate_interval([*[r[:5] for r in rounds[:3]], *rounds[3:]], log=True) is not None
-    assert rate_interval([], log=False) is None
+    ratios = (3 * np.random.default_rng(2).lognormal(0, 0.3, 8)).tolist()
+    for log in (False, True):
+        interval = rate_interval(ratios, range(8), log=log)
+        whole = average_interval(ratios, log=log)
+        assert (interval.low, interval.high) == pytest.approx((whole.low - 1, whole.high - 1))
+    assert rate_interval(ratios[:5], range(5), log=False) is None
+    assert enough_rounds([6, 6, 1])
+    assert not enough_rounds([6, 1, 1])
+    assert not enough_rounds([])
+
+
+def test_surfaces_of_one_family_do_not_narrow_the_interval_of_a_rate():
+    ratios = [2.0, 3.0, 5.0, 4.0, 6.0, 3.5]
+    alone = rate_interval(ratios, "abcdef", log=False)
+    copied = rate_interval(ratios * 4, "abcdef" * 4, log=False)
+    assert (copied.low, copied.high) == pytest.approx((alone.low, alone.high))
+    apart = rate_interval(ratios * 4, range(24), log=False)
+    assert apart.high - apart.low < 0.5 * (alone.high - alone.low)
 
 
 def test_a_family_has_one_vote_and_ties_and_what_is_untried_have_none():

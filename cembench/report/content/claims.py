@@ -14,6 +14,7 @@ from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
+from cembench.report.content.printed_tables import corrected_rate
 from cembench.report.document import ORIGINS, VERDICTS, Claim, Column, Table, Verdict
 from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
 from cembench.results.frame import evaluate, filled
@@ -59,7 +60,7 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
     `surface` has the mark of its origin, since a stand-in is named as the model that it stands for.
     `policy` is the number of the linear-algebra policy. `chosen` are the records that stand for
     their algorithm on a surface, whatever the policy. `below_one` is the share of the corners whose
-    angles change by less than a degree.
+    angles change by less than a degree, `printed_rate` the rate of speedup that the paper prints.
     """
     frame = evidence.frame
     by_ok = frame.sort_values("ok", ascending=False, kind="stable")
@@ -74,6 +75,10 @@ def claims_frame(evidence: Evidence, inspections: Inspections) -> pd.DataFrame:
         surface=frame["surface"] + frame["origin"].map(lambda origin: ORIGINS[origin][1]),
         policy=frame["solves"].map(evidence.policies.index),
         chosen=chosen,
+        printed_rate=[
+            corrected_rate(evidence.paper, model or "", algorithm)
+            for model, algorithm in zip(frame["model"], frame["algorithm"], strict=True)
+        ],
         below_one=[known.get((place, label)) if one else None for place, label, one in maps],
     )
 
@@ -90,7 +95,6 @@ def known_names(evidence: Evidence) -> dict[str, Any]:
         "disk": disk,
         "under": lambda policy: under(policy, evidence),
         "printed": paper.printed_figure,
-        "stated": lambda what, algorithm: paper.stated[what][algorithm],
         "models_of": lambda plot: paper.plotted(plot).models,
         "exhibits_of": lambda *of: [e.title for e in evidence.exhibits if e.figure in of],
         "tables": paper.tables,
@@ -121,7 +125,8 @@ def _tested(
             case["family"] = group["family"].iloc[0] if "place" in claim.per else None
     names = (*claim.per, *claim.each, "of", "lacking", "holds")
     columns = {name: pd.Series([case[name] for case in cases]) for name in names}
-    held, tested, lacking = (int(columns[name].sum()) for name in ("holds", "of", "lacking"))
+    tested, lacking = (int(columns[name].sum()) for name in ("of", "lacking"))
+    held = int(sum(case["holds"] for case in cases if case["of"]))
     values = {**known, **columns, "held": held, "tested": tested}
     over = evaluate(claim.over, frame, values) if claim.over else frame["place"].isin(places)
     surfaces = None if over is None else sorted(set(frame["place"][over]))

@@ -155,7 +155,10 @@ class Evidence:
     @cached_property
     def rows(self) -> dict[str, dict[str, Any]]:
         """The records as flat rows, by key of the cell."""
-        return {row["key"]: row for row in columns.rows(self.records, self.reference)}
+        return {
+            row["key"]: row | {"family": self.by_hash[row["mesh_hash"]].family}
+            for row in columns.rows(self.records, self.reference)
+        }
 
     @cached_property
     def frame(self) -> pd.DataFrame:
@@ -253,7 +256,9 @@ class Evidence:
         from cembench.registry import load_registry
 
         order = self.paper.models
-        public = {one.mesh_hash: one.name for one in load_registry().datasets.values()}
+        datasets = load_registry().datasets.values()
+        public = {one.mesh_hash: one.name for one in datasets}
+        shown = {one.paper_row: one.family for one in datasets if one.paper_row}
         surfaces: dict[str, MeasuredSurface] = {}
         for record in self.records:
             facts = record.mesh
@@ -262,6 +267,9 @@ class Evidence:
             if row not in order:
                 row = self.paper.model_of(name, facts.faces)
                 origin = "model" if row else "surface"
+            family = family_of(record)
+            if origin == "stand-in":
+                family = shown.get(row) or self.paper.object_of(row)
             surfaces[record.cell.mesh_hash] = MeasuredSurface(
                 name=record.cell.mesh,
                 mesh_hash=record.cell.mesh_hash,
@@ -271,7 +279,7 @@ class Evidence:
                 non_delaunay_share=facts.non_delaunay_share,
                 paper_row=row,
                 origin=origin,
-                family=family_of(record),
+                family=family,
             )
 
         def place(s: MeasuredSurface) -> tuple[int, int, str]:

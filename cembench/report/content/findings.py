@@ -19,20 +19,26 @@ from cembench.report.content.evidence import (
     Evidence,
 )
 from cembench.report.content.inspection import Inspection
-from cembench.report.content.printed_tables import MEAN_RATE, measured, measured_rates
+from cembench.report.content.printed_tables import (
+    MEAN_RATE,
+    measured,
+    measured_rates,
+    printed_rates,
+)
 from cembench.report.declarations import own
 from cembench.report.declared import declared_table
 from cembench.report.document import VERDICTS, Claim, Figure, Finding, Findings, Sentence
-from cembench.results.comparison import Comparison, compare_ratios, paired_ratios
+from cembench.results.comparison import Comparison, compare_ratios, paired_ratios, verdict_of
 from cembench.results.families import (
     FEWEST_FAMILIES,
     average_interval,
+    enough_rounds,
     family_means,
     rate_interval,
     share_interval,
 )
 from cembench.results.frame import phrase
-from cembench.results.intervals import DEFAULT_ROUNDS, Interval
+from cembench.results.intervals import DEFAULT_ROUNDS, Interval, share_of
 from cembench.results.stability import outlier_lines, scatter_words, stability_words
 
 if TYPE_CHECKING:
@@ -145,10 +151,12 @@ def _speeds(
 ) -> tuple[Comparison | None, int]:
     """Compare the two fastest algorithms by the ratios of their seconds within rounds.
 
-    With enough families the ratios of these decide, which is a statement on other families;
+    With enough families their geometric mean decides, which is a statement on other families;
     otherwise the means over the surfaces in each round do, a statement on these surfaces. Surfaces
     on which they share no round are left out. The second value is the number of families.
     """
+    import pandas as pd
+
     slower, faster = ([evidence.by_key[key] for key in keys[good[k]]] for k in (1, 0))
     paired = [paired_ratios(a, b) for a, b in zip(slower, faster, strict=True)]
     families = [family for family, ratios in zip(families, paired, strict=True) if ratios]
@@ -156,12 +164,14 @@ def _speeds(
     if not ratios:
         return None, 0
     if len(set(families)) >= FEWEST_FAMILIES:
-        logs = [median(map(log, ratio)) for ratio in ratios]
-        by_family = [exp(one) for one in family_means(logs, families)]
-        return compare_ratios(by_family), len(by_family)
+        middles = pd.Series([exp(median(map(log, ratio))) for ratio in ratios])
+        over = _over_families(middles, families)
+        compared = Comparison(over.mean, over.interval, verdict_of(over.interval), len(ratios))
+        return compared, len(set(families))
     rounds = min(map(len, ratios))
+    share = share_of(rounds, *(record.cell for record in (*slower, *faster)))
     together = np.log([ratio[:rounds] for ratio in ratios]).mean(axis=0)
-    return compare_ratios(np.exp(together).tolist()), len(set(families))
+    return compare_ratios(np.exp(together).tolist(), share), len(set(families))
 
 
 def listed(names: Sequence[str]) -> str:
@@ -294,6 +304,11 @@ def claim_of_the_paper(evidence: Evidence) -> str:
     paper = evidence.paper
     names = ", ".join(algorithm.upper() for algorithm in paper.compared)
     printed = ", ".join(f"{paper.stated['rate'][algorithm]:.1f}" for algorithm in paper.compared)
+    these = [surface.paper_row for surface in evidence.one_per_model]
+    if len(these) < len(paper.models):
+        means = [MEAN_RATE.of(printed_rates(paper, one, these)) for one in paper.compared]
+        own = ", ".join("-" if mean is None else f"{mean:.1f}" for mean in means)
+        printed += f" over all models, {own} over these"
     by_policy = [(policy, _rates(evidence, policy)) for policy in evidence.policies]
     rates_here = "; ".join(f"{rates}{under(policy, evidence)}" for policy, (rates, _) in by_policy)
     origins = Counter(surface.origin for surface in evidence.one_per_model)
@@ -316,13 +331,13 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     phrases, sure = [], False
     for algorithm in evidence.paper.compared:
         rates = list(measured_rates(evidence, algorithm, policy).values())
-        rows = measured(evidence, algorithm, policy)
-        both = [(evidence.by_key[key], evidence.base(evidence.by_key[key])) for key in rows["key"]]
-        rounds = [paired_ratios(record, base) for record, base in both if base is not None]
-        interval = rate_interval(list(filter(None, rounds)), log=False)
+        rows = measured(evidence, algorithm, policy).dropna(subset="speedup")
+        rounds = rows["paired"].tolist()
+        ratios = (1 + rows["speedup"]).tolist()
+        interval = enough_rounds(rounds) and rate_interval(ratios, rows["family"], log=False)
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
         phrases.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
-        sure = sure or interval is not None
+        sure = sure or bool(interval)
     return ", ".join(phrases), sure
 
 

@@ -191,8 +191,8 @@ def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
     """Return a printed rate, or for a misprint the one that follows from the printed seconds."""
     rates, seconds = paper.table_of("rate"), paper.table_of("seconds")
     if rates is not None and (rates, model, algorithm) not in paper.misprints:
-        return paper.tables[rates][model][algorithm]
-    times = paper.tables[seconds][model] if seconds is not None else {}
+        return paper.tables[rates].get(model, {}).get(algorithm)
+    times = paper.tables[seconds].get(model, {}) if seconds is not None else {}
     ours, theirs = times.get(paper.reference), times.get(algorithm)
     return None if ours is None or theirs is None else theirs / ours - 1
 
