@@ -272,9 +272,9 @@ def reading_of_fdm(public: pd.Series) -> str:
     where = "" if public.all() else f" on {public.sum()} of {len(public)} surfaces"
     return (
         f"FDM is its authors' public program{where}, which turns the map by a + b/2 where the "
-        "middle (a + b)/2 of an edge is meant: the figures printed for the paper's models contain "
-        "that error."
+        "middle (a + b)/2 of an edge is meant. One printed figure depends on that slip, E_C of "
+        "Nefertiti, and contains it."
         if public.any()
-        else "FDM is the corrected reading; the printed figures contain a slip of its authors' "
-        "public program, which fdm.public_program=true reproduces."
+        else "FDM is the corrected reading; fdm.public_program=true has the slip of its authors' "
+        "public program, which one printed figure depends on, E_C of Nefertiti."
     )
