@@ -16,6 +16,7 @@ import importlib.util
 import inspect
 import json
 import os
+import shlex
 import sys
 import typing
 from collections import ChainMap
@@ -370,7 +371,7 @@ _TAKES = {"circular holes": _of_holes, "atlas": _of_any}
 
 def _program_name(command: str) -> str:
     """Return a short name for a command: its program, or the script that an interpreter runs."""
-    parts = [Path(word) for word in command.split()]
+    parts = [Path(word) for word in shlex.split(command)]
     script = next((word for word in parts[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
     return (script or next(iter(parts), Path("program"))).stem or "program"
 

@@ -95,7 +95,8 @@ def submit(
 def _licences(run: Store, own: str) -> dict[str, str]:
     """Return the licence of each surface by its hash; "" if none is stated.
 
-    Generated surfaces are part of cembench; public ones have that of their publisher.
+    Generated surfaces are part of cembench; public ones have that of their publisher. A file that
+    is named as a generated surface is not one: its family is not that.
     """
     from cembench.core.names import slug
     from cembench.registry import load_registry
@@ -103,11 +104,13 @@ def _licences(run: Store, own: str) -> dict[str, str]:
     registry = load_registry()
     public = {d.mesh_hash: "" if d.fetch_only else d.licence for d in registry.datasets.values()}
     made = {slug(name) for name in registry.surfaces}
-    cells = {record.cell.mesh_hash: record.cell.mesh for record in run.records()}
-    return {
-        key: public[key] if key in public else "MIT" if slug(name) in made else own
-        for key, name in cells.items()
+    cells = {record.cell.mesh_hash: record for record in run.records()}
+    generated = {
+        key
+        for key, record in cells.items()
+        if slug(record.cell.mesh) in made and record.mesh.family in registry.surfaces
     }
+    return {key: public.get(key, "MIT" if key in generated else own) for key in cells}
 
 
 def check_submissions(

@@ -55,7 +55,7 @@ def show_report(report: Report, folder: Path) -> None:
     out.print(paper_tables(report))
     verdicts = summary(report, folder)["verdicts"]
     if verdicts:
-        out.print("Claims: " + ", ".join(f"{n} {verdict}" for verdict, n in verdicts.items()))
+        out.print("Claims: " + ", ".join(f"{verdict} {n}" for verdict, n in verdicts.items()))
     out.print(f"Report: {(folder / 'index.html').resolve()}", soft_wrap=True, markup=False)
 
 

@@ -94,7 +94,7 @@ def paper_value(paper: Paper, table: int, model: str, column: str, digits: int) 
         return missing("the paper has no such model", "")
     number = paper.tables[table][model][column]
     if number is None:
-        return missing(f"Table {table} of the paper has a dash here")
+        return missing(f"Table {table} of the paper has no figure here")
     why = paper.misprints.get((table, model, column), "")
     text = f"{number:,.{digits}f}" + ("†" if why else "")
     return Value(text, number, "printed", why=f"misprint: {why}" if why else "")

@@ -313,7 +313,7 @@ def _profile(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _D
     x = Axis(spec.x.axis().title, log=True, low=1.0, high=last)
     panel = PlotPanel(x, Axis("families (%)", low=0, high=104), series)
     left_out = [label for label in dict.fromkeys(frame["label"]) if label not in ratios]
-    return _Drawn(panel, len(set(families)), left_out, spec.about)
+    return _Drawn(panel, len(families), left_out, spec.about)
 
 
 def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Drawn | None:

@@ -7,13 +7,14 @@ all runs stand together; seconds are only ever divided by seconds of the same ma
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.names import slug
-from cembench.report.content.evidence import ANGLE, DISK, Evidence
+from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant
 from cembench.report.declarations import filled, own, parsed
 from cembench.report.declared import DeclaredTable, aggregate
 from cembench.report.document import (
@@ -89,6 +90,7 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
     from cembench.registry import load_registry
 
     registry, frames = load_registry(), []
+    usual, named = _usual_parameters(entrants), _of_one_title(entrants)
     for number, entrant in enumerate(entrants):
         evidence = entrant.evidence
         environments = evidence.store.environments()
@@ -97,6 +99,7 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
         records = [evidence.by_key[key] for key in frame["key"]]
         frame = frame.assign(
             run=entrant.name,
+            label=frame["label"].replace(_apart(entrant.evidence, usual, named)),
             record=[f"{number:03d}{key}" for key in frame["key"]],
             machine=[machine_of_record(record, environments) for record in records],
             family=[
@@ -109,6 +112,45 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
     return whole.astype(dict.fromkeys(("ok", "main", "as_good"), bool)).astype(
         dict.fromkeys((ANGLE, "seconds", "faces"), float)
     )
+
+
+def _usual_parameters(entrants: Sequence[Entrant]) -> dict[str, Variant]:
+    """Return the parameters that most runs have for each algorithm."""
+    chosen = Counter(
+        (series.algorithm, series.variant)
+        for entrant in entrants
+        for series in entrant.evidence.series
+        if series.main
+    )
+    return {algorithm: variant for (algorithm, variant), _ in reversed(chosen.most_common())}
+
+
+def _of_one_title(entrants: Sequence[Entrant]) -> Mapping[str, Collection[str]]:
+    """Return the names of the algorithms that have a label in some run."""
+    named: dict[str, set[str]] = {}
+    for series in (series for entrant in entrants for series in entrant.evidence.series):
+        named.setdefault(series.label, set()).add(series.algorithm)
+    return named
+
+
+def _apart(
+    evidence: Evidence, usual: Mapping[str, Variant], named: Mapping[str, Collection[str]]
+) -> dict[str, str]:
+    """Return new labels of a run's algorithms, of those that only share theirs with others.
+
+    Their parameters are not those of most runs, or another run has another algorithm of that title.
+    """
+    labels = {}
+    for series in evidence.series:
+        others = [series.algorithm] * (len(named[series.label]) > 1)
+        others += [
+            f"{name}={value}"
+            for name, value in series.variant
+            if (name, value) not in usual.get(series.algorithm, series.variant)
+        ]
+        if series.main and others:
+            labels[series.label] = f"{series.label} ({', '.join(others)})"
+    return labels
 
 
 def family(name: str, mesh_hash: str, origin: str, registry: Registry) -> str:

@@ -217,7 +217,7 @@ def exponents_table(evidence: Evidence) -> Table:
     rows = []
     there, measured = printed(evidence), evidence.frame
     for series in evidence.disk_series:
-        of_paper = there[there["algorithm"] == series.algorithm]
+        of_paper = there[(there["algorithm"] == series.algorithm) & series.main]
         cells = [words(series.label), *_fit_cells(of_paper)]
         own = measured[measured["ok"] & (measured["label"] == series.label)]
         for policy in evidence.policies:

@@ -102,16 +102,22 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
             Column(f"than {reference}", numeric=False),
         ],
         [
-            [mesh, name + policy, one.speedup, _interval(one.speedup_interval, " to "), one.verdict]
+            [mesh, name + policy, one.speedup, _sure(one), one.verdict]
             for (mesh, name, policy, _), one in zip(compared_by_name, together, strict=True)
         ],
         notes=tuple(_corrected_words([comparison for _, comparison in compared])),
     )
 
 
-def _interval(interval: Interval | None, to: str) -> Value:
+def _sure(one: Comparison) -> Value:
+    """Return the interval of a speedup, or why there is none."""
+    again = "; `run --fresh` measures both again" * (one.verdict == "not side by side")
+    return _interval(one.speedup_interval, " to ", one.verdict + again)
+
+
+def _interval(interval: Interval | None, to: str, lacking: str = FEW_ROUNDS) -> Value:
     if interval is None:
-        return entry(None, "", FEW_ROUNDS)
+        return entry(None, "", lacking)
     return words(f"{interval.low:.2f}{to}{interval.high:.2f}")
 
 

@@ -101,6 +101,10 @@ def examine(
             f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
             "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
         )
+    if asked.checks_only and asked.require:
+        raise ParameterError.about(
+            "{require} needs the stages that {checks_only} leaves out; leave one of them out."
+        )
     if asked.up_to:
         sizes(asked.up_to)  # fail now, not after the timing
     work = _Work(

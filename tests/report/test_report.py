@@ -248,7 +248,7 @@ def test_the_verb_says_where_the_report_is(cli, small_run):
     assert data["claims"]["delaunay"] == "holds"
     assert "table-4" in data["tables"]
     assert data["paper"]["doi"] == CITATION.doi
-    assert data["findings"][0].startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1; ")
+    assert data["findings"][0].startswith("CEM against QIEM, FDM, LDM: printed 8.5, 17.2, 4.1 ")
     assert sum(data["verdicts"].values()) == len(data["claims"])
     assert next(iter(data["verdicts"])) == "does not hold here"
     assert "[1/4] surface Chinese Vase" in err

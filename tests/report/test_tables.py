@@ -181,7 +181,7 @@ def test_the_misprint_is_marked(evidence):
     assert value.text == "29.07†"
     assert "28.07" in value.why
     dash = paper_value(PAPER, 2, "Isis Statue", "fdm", 2)
-    assert (dash.number, dash.why) == (None, "Table 2 of the paper has a dash here")
+    assert (dash.number, dash.why) == (None, "Table 2 of the paper has no figure here")
 
 
 def test_both_ways_of_solving_stand_side_by_side(evidence):

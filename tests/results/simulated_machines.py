@@ -42,6 +42,7 @@ def record_of(surface, algorithm, number, speed, name, **round_):
             faces=mesh.m,
             boundary_vertices=len(mesh.boundary),
             non_delaunay_share=0.0,
+            family=surface if name == surface else "",
         ),
         outcome=Outcome(status="failed", cause="it gave up")
         if failed

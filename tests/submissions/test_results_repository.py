@@ -334,8 +334,10 @@ def test_the_metadata_is_a_crate_with_machine_versions_and_licences(bundles):
         assert not [name for name in archive.namelist() if name.startswith(("maps", "meshes"))]
 
 
-def test_surfaces_of_unknown_licence_are_not_sent(tmp_path):
-    run = machine_run(tmp_path / "run", 1, mesh="my-face")
+@pytest.mark.parametrize("name", ["my-face", "catenoid-sheet"])
+def test_surfaces_of_unknown_licence_are_not_sent(tmp_path, name):
+    """Nor is a file that has the name of a generated surface."""
+    run = machine_run(tmp_path / "run", 1, mesh=name)
     for licence, sent in ((None, 0), ("CC0-1.0", 1)):
         path = tmp_path / f"{licence}.zip"
         result = cembench.submit(run.folder, path, maps=True, surfaces_licence=licence)

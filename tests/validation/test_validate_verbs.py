@@ -113,6 +113,11 @@ def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
         (":right", ("-p", "steps"), "-p 'steps' is not of the form NAME=VALUE"),
         (":right", ("--up-to", 100), "--up-to 100 is too few"),
         (":right", ("--require", "wonders"), "--require wonders is not allowed"),
+        (
+            ":right",
+            ("--require", "faster", "--checks-only"),
+            "--require needs the stages that --checks-only leaves out",
+        ),
     ],
 )
 def test_bad_usage_is_said_before_anything_is_run(here, cli, plugin, arguments, message):

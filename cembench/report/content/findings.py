@@ -120,8 +120,8 @@ def field_of(evidence: Evidence, policy: str) -> dict[str, Any]:
             around = [share_interval(share, known["families"]) for share in known["smallest"]]
             known["shares"] = [(100 * one.low, 100 * one.high) for one in around]
     speeds, timed = _speeds(evidence, keys, good, families) if len(good) > 1 else (None, 0)
-    known |= {"rounds": speeds.rounds if speeds else 0, "verdict": speeds and speeds.verdict}
     known |= {"timed": timed, "few_timed": timed < FEWEST_FAMILIES}
+    known["verdict"] = speeds and speeds.verdict
     known |= {
         "speeds": _ends(speeds.interval if speeds else None),
         "speed_ratio": speeds and speeds.ratio,
@@ -234,7 +234,7 @@ def field_words(field: Mapping[str, Any]) -> list[str]:
 def field_figures(field: Mapping[str, Any]) -> list[Finding]:
     """Return the key figures: the fastest against the next, and the best angles."""
     figures = [Finding(f"{field['angle_mean']:.2f}°", field["angle"])]
-    if field["rounds"]:
+    if field["speed"]:
         figures.insert(0, Finding(f"{field['speed_ratio']:.2f} times", field["speed"]))
     return figures
 
@@ -343,7 +343,7 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
 
 def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
     """Return the numbers of all verdicts, failing ones first and with links to their claims."""
-    parts: list[str | Claim] = [f"Of {len(claims)} claims of the paper, "]
+    parts: list[str | Claim] = [f"Of {len(claims)} claim{'s' * (len(claims) > 1)} of the paper, "]
     for verdict, (one, several) in VERDICTS.items():
         claims_of = [claim for claim in claims if claim.verdict == verdict]
         if claims_of:

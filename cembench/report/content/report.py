@@ -288,8 +288,8 @@ def stand_ins_words(evidence: Evidence) -> str:
         else ""
     )
     return (
-        f"{len(standing)} of {len(evidence.models)} surfaces are stand-ins for models that are not "
-        "public. They stand in for the models' counts, triangles and boundary vertices, and so for "
+        f"{len(standing)} of {len(evidence.models)} surfaces are stand-ins for the paper's models. "
+        "They stand in for the models' counts, triangles and boundary vertices, and so for "
         f"seconds; not for their difficulty: {energy}{thin} of {len(standing)} have edges that are "
         "not Delaunay. Their energies and angles belong to other surfaces. docs/surfaces.md names "
         "the real surface nearest to each row in counts and difficulty."
