@@ -36,7 +36,7 @@ def algorithms_named(name: str | None) -> tuple[str, ...]:
 
 @checked
 def map_files(
-    meshes: Sequence[AnyPath],
+    meshes: AnyPath | Sequence[AnyPath],
     algorithm: str | None = None,
     *,
     parameters: Mapping[str, Any] | None = None,
@@ -74,7 +74,7 @@ def map_files(
 
     Parameters
     ----------
-    meshes : sequence of paths or names
+    meshes : path or name, or sequence of them
         Mesh files (OBJ, OFF, PLY, STL, MAT), or names of surfaces; public ones are fetched.
     algorithm : str, optional
         Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
@@ -159,6 +159,7 @@ def map_files(
 
     """
     from dataclasses import replace
+    from os import PathLike
     from pathlib import Path
 
     from cembench.api.components import read_shells
@@ -172,7 +173,7 @@ def map_files(
     )
     from cembench.api.map_surfaces import FileJobs, Maps, local_files
     from cembench.api.write_maps import FileOptions, beside
-    from cembench.core.overwriting import refuse_inputs, refuse_present
+    from cembench.core.overwriting import refuse_inputs, refuse_present, refuse_twice
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
 
@@ -190,6 +191,8 @@ def map_files(
         )
     if cut:
         check_takes_disks(candidates)
+    if isinstance(meshes, str | PathLike):
+        meshes = [meshes]
     paths, target = [Path(mesh) for mesh in meshes], path_of(output)
     outputs = output_files(paths, target)
     named = {"geometry_image": geometry_image, "remeshed": remesh, "html": html}
@@ -207,7 +210,9 @@ def map_files(
     written = list(dict.fromkeys(path for path in outputs if path is not None))
     others = [path for file in written for path in beside(file, file_options)]
     inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
-    for path in (*written, *others, *file_options.extras.values()):
+    all_files = [*written, *others, *file_options.extras.values()]
+    refuse_twice(all_files, "files", "Name another path for one of them.")
+    for path in all_files:
         refuse_inputs(path, inputs, force=overwrite)
     refuse_present(others if target in outputs else [*written, *others], force=overwrite)
     together = target if len(paths) > 1 and target in outputs else None
@@ -229,6 +234,7 @@ def map_files(
     elif preview:
         chosen = [file.tasks[0].algorithm for file in files]
         pictures = picture_files(sources, chosen, [f.output for f in files], overwrite=overwrite)
+        refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")
         files = [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
     for folder in {path.parent for path in written}:
         folder.mkdir(exist_ok=True)

@@ -15,6 +15,7 @@ from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
+from cembench.core.overwriting import check_page, refuse_twice
 from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
@@ -77,12 +78,10 @@ def check_options(
             check_image_format(path)
         elif what == "remeshed":
             check_writable_format(path, with_uv=True)
-        elif path.suffix.lower() not in (".html", ".htm"):
-            raise ParameterError.about(
-                "{page}: {html} writes a web page; use the suffix .html.", page=path
-            )
-        elif not path.parent.is_dir():
-            raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
+        else:
+            check_page(path)
+            if not path.parent.is_dir():
+                raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
@@ -162,11 +161,7 @@ def picture_files(
         else target.with_suffix(".png")
         for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
     ]
-    twice = [picture for picture in pictures if pictures.count(picture) > 1]
-    if twice:
-        raise ParameterError(
-            f"two pictures would be written to {twice[0]}; draw them one at a time."
-        )
+    refuse_twice(pictures, "pictures", "Draw them one at a time.")
     if not overwrite:
         from cembench.drawing.replaceable_pictures import check_replaceable
 
@@ -205,11 +200,7 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
         output / f"{path.stem}{'.ply' if path.suffix.lower() == '.ply' else '.obj'}"
         for path in meshes
     ]
-    twice = [file for file in files if files.count(file) > 1]
-    if twice:
-        raise ParameterError(
-            f"two surfaces would be written to {twice[0]}; write them to different folders."
-        )
+    refuse_twice(files, "surfaces", "Write them to different folders.")
     return list(files)
 
 

@@ -21,6 +21,7 @@ from cembench.api.settings import Placement
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
+from cembench.core.overwriting import check_page
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
@@ -261,12 +262,21 @@ class Result:
         matplotlib.figure.Figure
             The figure, which ``matplotlib.pyplot.show()`` or a notebook displays.
 
+        Raises
+        ------
+        ParameterError
+            The path does not end in .png.
+
         """
         import io
 
         from matplotlib import pyplot
         from matplotlib.image import imread
 
+        if path is not None and Path(path).suffix.lower() != ".png":
+            raise ParameterError(
+                f"{path}: the picture is a PNG; for other formats use `savefig` of the figure."
+            )
         png = self._png()
         if path is not None:
             from cembench.core.atomic import write
@@ -302,6 +312,8 @@ class Result:
         ------
         RenderError
             The page cannot be written.
+        ParameterError
+            The path does not end in .html.
 
         """
         import tempfile
@@ -310,6 +322,8 @@ class Result:
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 
+        if path is not None:
+            check_page(Path(path))
         page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title)
         if path is not None:
             write_view_page(Path(path), page)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import deque
 from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
@@ -37,7 +38,7 @@ def parameterize_many(
 
     Parameters
     ----------
-    surfaces : iterable of meshes, paths, names or pairs (V, F)
+    surfaces : iterable of meshes, paths, names or pairs (V, F); or one path or name
         Disks or surfaces with holes.
     algorithm : str, optional
         As for :func:`parameterize`.
@@ -84,6 +85,8 @@ def parameterize_many(
         _mapped, algorithm=algorithm, check=check, keep_invalid=keep_invalid,
         plugins=tuple(plugins), **parameters,
     )  # fmt: skip
+    if isinstance(surfaces, str | os.PathLike):
+        surfaces = [surfaces]
     results = map(one, surfaces) if jobs == 1 else _in_processes(one, surfaces, jobs)
     return _results(results, raises=errors == "raise")
 

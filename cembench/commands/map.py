@@ -57,7 +57,7 @@ def map_(
             note(f"{path}: {notice}")
         if not as_json:
             print_notices([mapped.surface.mesh])
-            if len(maps) > 1:
+            if len(maps) > 1 and not verbose:
                 _show_line(mapped, len(maps.done), len(maps))
             else:
                 _show_all(mapped, verbose=verbose, keep_invalid=maps.keep_invalid)
@@ -117,3 +117,6 @@ def _show_line(mapped: Mapped, number: int, count: int) -> None:
     where = [mapped.written[what] for what in ("output", "preview") if what in mapped.written]
     parts += where[:1]
     out.print("  ".join(parts), soft_wrap=True)
+    for said in (*map(str, record.outcome.notes), mapped.certificate):
+        if said:
+            out.print(f"    {said}", soft_wrap=True, markup=False)

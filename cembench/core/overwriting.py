@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from cembench.core.errors import ParameterError
@@ -21,6 +21,23 @@ def refuse_inputs(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
                 path=output,
                 source=source,
             )
+
+
+def check_page(path: Path) -> None:
+    """Raise :class:`ParameterError` if a web page is to be written to a file of another kind."""
+    if path.suffix.lower() not in (".html", ".htm"):
+        raise ParameterError(f"{path} is no name of a web page; use the suffix .html.")
+
+
+def refuse_twice(outputs: Sequence[Path], what: str, remedy: str) -> None:
+    """Raise :class:`ParameterError` if two of `what` have the same path; `remedy` says what to do.
+
+    >>> from pathlib import Path
+    >>> refuse_twice([Path("a.obj"), Path("b.obj")], "surfaces", "Name two folders.")
+    """
+    for output in outputs:
+        if outputs.count(output) > 1:
+            raise ParameterError(f"two {what} would be written to {output}. {remedy}")
 
 
 def refuse_present(outputs: Iterable[Path], *, force: bool) -> None:

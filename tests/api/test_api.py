@@ -67,6 +67,18 @@ def test_a_result_shows_and_saves_itself(disk, tmp_path):
     with pytest.raises(cembench.ParameterError, match="overwrite=True"):
         result.save(saved)
     result.save(saved, overwrite=True)
+    with pytest.raises(cembench.ParameterError, match="the picture is a PNG"):
+        result.plot(tmp_path / "a.pdf")
+    with pytest.raises(cembench.ParameterError, match=r"use the suffix \.html"):
+        result.show(tmp_path / "a.txt")
+    assert not [*tmp_path.glob("*.pdf"), *tmp_path.glob("*.txt")]
+
+
+def test_one_file_or_name_is_a_list_of_one(disk, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    cembench.write_mesh("a.obj", disk)
+    assert [one.ok for one in cembench.map_files("a.obj")] == [True]
+    assert [one.ok for one in cembench.parameterize_many("cone")] == [True]
 
 
 def test_a_notebook_shows_a_plot_once(disk, monkeypatch):

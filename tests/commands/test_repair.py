@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import trimesh
 
+import cembench
 from cembench import DiskMesh, TriangleMesh
 from cembench.mesh.files import read_mesh
 from cembench.mesh.repair import Step
@@ -269,3 +270,30 @@ def test_a_wrong_scale_is_named_with_the_file_and_not_mended(tmp_path, cli):
         assert f"{tmp_path / 'huge.obj'}: a coordinate is 5e+200 in size" in err
         assert "divide all coordinates" in err
         assert "cembench repair" not in err
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        ("--remesh", "r.obj", "--side", 11),
+        ("--preview", "--geometry-image", "r.png", "--side", 9),
+        ("--checker", "--geometry-image", "r_texture.png", "--side", 9),
+    ],
+)
+def test_two_outputs_of_one_name_are_refused(cli, options):
+    cembench.write_mesh(cli.folder / "face.obj", cembench.surface("cone", 200))
+    code, _, err = cli("map", "face.obj", "-o", "r.obj", *options)
+    assert code == 2
+    assert "two files would be written to r" in err
+    assert [file.name for file in cli.folder.iterdir()] == ["face.obj"]
+
+
+def test_several_surfaces_have_their_notes_and_certificates(cli):
+    for name in ("a", "b"):
+        cembench.write_mesh(
+            cli.folder / f"{name}.obj", cembench.surface("cylinder-sheet", 800, height=30)
+        )
+    code, out, _ = cli("map", "a.obj", "b.obj", "--certificate")
+    assert code == 0
+    assert out.count("far from conformal") == out.count("modulus is between") == 2
+    assert cli("map", "a.obj", "b.obj", "-v")[1].count("Dirichlet energy") == 2
