@@ -9,7 +9,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from cembench.core.errors import ParameterError
 
@@ -18,6 +18,15 @@ class Declaration(BaseModel):
     """A part of a declaration, which has no other keys than its own."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _allowed(cls, given: Any) -> Any:
+        for name in given if isinstance(given, Mapping) else ():
+            if name not in cls.model_fields:
+                known = ", ".join(cls.model_fields)
+                raise ValueError(f"{name!r} is not known here; allowed are {known}")
+        return given
 
 
 D = TypeVar("D", bound=Declaration)
@@ -64,7 +73,8 @@ def parsed(declared: Mapping[str, Any], kind: type[D], where: str) -> dict[str, 
         except ValidationError as error:
             first = error.errors()[0]
             place = " / ".join([name, *map(str, first["loc"])])
-            raise ParameterError(f"{where}, {place}: {first['msg']}.") from error
+            what = first["msg"].removeprefix("Value error, ")
+            raise ParameterError(f"{where}, {place}: {what}.") from error
     return entries
 
 

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 
 from pydantic import Field, model_validator
 
+from cembench.core.errors import ParameterError
 from cembench.report.by_surface import (
     POLICIES,
     Footer,
@@ -226,7 +227,23 @@ def declared_table(
         What braces in title and caption stand for, besides ``{policy}``.
 
     """
-    spec = declared or own_tables()[name]
+    try:
+        spec = declared or own_tables()[name]
+        return _over(evidence, spec, keys, surfaces, notes, called or name, policy, texts)
+    except ParameterError as error:
+        raise ParameterError(f"table {name!r}: {error}") from error
+
+
+def _over(
+    evidence: Evidence,
+    spec: DeclaredTable,
+    keys: Iterable[str] | None,
+    surfaces: Sequence[MeasuredSurface],
+    notes: Sequence[str],
+    name: str,
+    policy: str,
+    texts: Mapping[str, str],
+) -> Table | None:
     held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]
     policy = policy or evidence.policies[0]
     chosen = evidence.frame["solves"].isin(held)
@@ -246,10 +263,10 @@ def declared_table(
     known |= {"reference": evidence.reference_label, **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
-        return _of_surfaces(evidence, spec, frame, surfaces, called or name, known, below)
+        return _of_surfaces(evidence, spec, frame, surfaces, name, known, below)
     columns, entries = zip(*_columns(evidence, spec, frame, known), strict=True)
     title, caption = filled(spec.title, known), filled(spec.caption, known)
-    return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
+    return Table(name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
 
 def _of_surfaces(
@@ -343,6 +360,10 @@ def _entry(evidence: Evidence, row: Mapping[str, Any], one: DeclaredColumn) -> V
 def aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     """Return the value of a column over a group of rows."""
     value = evaluate(one.value, group)
+    if hasattr(value, "iloc"):
+        raise ParameterError(
+            f"{one.value!r} has a value for each record; take one, e.g. median({one.value})."
+        )
     if one.words:
         return words("-" if value is None else str(value))
     key = str(evaluate(one.record, group) or "") if one.record else ""

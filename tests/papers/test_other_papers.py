@@ -63,7 +63,7 @@ def test_the_guide_s_paper_has_a_report(disks, tmp_path, quick_drawing):
     report = write_report(disks, tmp_path / "report", "c", paper=read_paper(folder))
     table = next(table for table in items_of(report, Table) if table.name == "table-3")
     (row,) = ([value.text for value in row] for row in table.rows)
-    assert (row[0], row[2], row[4]) == ("Teapot", "0.50", "0.40")
+    assert (row[0], row[2], row[4]) == ("Teapot", "0.5000", "0.4000")
     assert verdicts(disks, "", read_paper(folder)).keys() == {"lower-energy"}
 
 

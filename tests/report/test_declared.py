@@ -75,7 +75,14 @@ def test_the_report_has_it_in_all_forms(small_run, mine, tmp_path, quick_drawing
         ("a = 3", "mine.toml, a: "),
         ('[a]\ntitle = "A"\ncolumns = ["sekonds"]', "no column 'sekonds'; known: surface"),
         ('[a]\ntitle = "A"\ncolumns = []', "a / columns: Tuple should have at least 1 item"),
-        ('[a]\ntitle = "A"\ncolumns = ["mesh"]\ncolour = 1', "a / colour: Extra inputs"),
+        (
+            '[a]\ntitle = "A"\nrows = "algorithm"\ncolumns = [{ title = "m", value = "seconds" }]',
+            "table 'a': 'seconds' has a value for each record; take one, e.g. median(seconds)",
+        ),
+        (
+            '[a]\ntitle = "A"\ncolumns = ["mesh"]\ncolour = 1',
+            "a: 'colour' is not known here; allowed are title, ",
+        ),
         (
             '[a]\ntitle = "A"\nrows = "algorithm"\ncolumns = ["seconds"]',
             "takes expressions (value)",
