@@ -54,7 +54,8 @@ PLAIN = SeriesStyle("#6b7683", ("o", "circle"), (":", "dot"))
 #: different from them, because both occur in one legend.
 PARTS = (
     "#77aadd", "#ee8866", "#44bb99", "#eedd88", "#ffaabb", "#bbcc33", "#99ddff", "#c2a5cf",
-    "#d9b48f", "#aaaa00", "#8da0cb", "#a9c7b4",
+    "#d9b48f", "#aaaa00", "#8da0cb", "#a9c7b4", "#e78ac3", "#66c2a5", "#b07d62", "#7fa1c4",
+    "#d5c1e8", "#f2c14e",
 )  # fmt: skip
 REST = "#b3b9c0"
 
@@ -68,7 +69,8 @@ def series_styles(names: Sequence[str]) -> dict[str, SeriesStyle]:
 #: Phases with a colour of their own, the same in every plot.
 _PHASES = (
     "solves", "factorisation", "assembly", "laplacian", "ordering", "symbolic", "boundary",
-    "beltrami", "boundary step", "folds", "energy", "start",
+    "beltrami", "boundary step", "folds", "energy", "start", "patches", "condensation",
+    "dense factorisation", "schur complement", "gauge", "process",
 )  # fmt: skip
 
 

@@ -107,6 +107,8 @@ FORMS = ("png", "svg", "pdf")
 WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 #: A logarithmic axis that spans less than this factor has ticks at 2 and 5 too.
 DECADES = 300
+#: A logarithmic axis that spans less than this factor is labelled as a linear one is.
+SHORT = 5
 #: From here on, ticks of a logarithmic axis are written as powers of ten.
 LARGE = 10_000_000
 _RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -266,9 +268,12 @@ def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
         (panel.y, axes.yaxis, axes.get_ylim()),
     ):
         if scale.log:
-            few = ends[1] < DECADES * ends[0]
-            axis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-            axis.set_major_formatter(FuncFormatter(lambda value, _: _tick(value)))
+            few, short = ends[1] < DECADES * ends[0], ends[1] < SHORT * ends[0]
+            subs = (1, 2, 5) if few else (1,)
+            axis.set_major_locator(
+                MaxNLocator(5, steps=(1, 2, 5, 10)) if short else LogLocator(subs=subs)
+            )
+            axis.set_major_formatter("{x:g}" if short else FuncFormatter(lambda v, _: _tick(v)))
             axis.set_minor_formatter(NullFormatter())
     if _counts(panel):
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))

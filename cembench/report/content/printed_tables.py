@@ -85,6 +85,7 @@ def _printed_table(evidence: Evidence, number: int, policy: str | None) -> list[
         ("surfaces", evidence.others, rest),
     ):
         quantities = [q for s in series for q in _quantities(evidence, number, s)]
+        surfaces = tuple(one for one in surfaces if any(evidence.find(one, s) for s in series))
         if table.figures and surfaces and (quantities or what == "surfaces"):
             of = f"{title}: {what} that are not in the paper{add}"
             at = f"{name}-other-{what}"
