@@ -56,7 +56,7 @@ def theory_exhibit(of_disk: TheoryFacts, command: str) -> Exhibit:
         text=f"{_size(facts)}. {_summary(facts)}"
         + (f" {of_disk.missing}" if of_disk.missing else ""),
         command=command,
-        origin="surface",
+        origin=facts["origin"],
         pictures=(
             ExhibitPicture(
                 file=PICTURE,

@@ -11,7 +11,8 @@ import numpy as np
 from cembench.conformal.certificate import certify
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import Algorithm
+from cembench.registry import Algorithm, load_registry
+from cembench.running.plan import provenance_of
 
 from .boundary_operator import (
     TOLERANCE,
@@ -79,6 +80,7 @@ def theory_facts(mesh: DiskMesh, rival: Algorithm | None, iterations: int) -> Th
     rate = predicted_rate(leading)
     facts: dict[str, Any] = {
         "mesh": mesh.name,
+        "origin": _origin(mesh),
         "vertices": mesh.n,
         "boundary_vertices": K.size,
         "premises_hold": all(check.holds for check in assumed),
@@ -127,6 +129,13 @@ def _rises(path: Any) -> dict[str, float | int]:
         "largest": float(rises.max(initial=0.0)),
         "together": float(rises.sum()),
     }
+
+
+def _origin(mesh: DiskMesh) -> str:
+    """Return whether a surface is a model of the paper, a stand-in for one, or neither."""
+    registry = load_registry()
+    made = registry.surfaces.get(mesh.name)
+    return "stand-in" if made and made.paper_row else provenance_of(registry, mesh).origin
 
 
 def _rival_history(

@@ -121,6 +121,14 @@ def test_in_python_too_the_exhibit_names_the_command_that_makes_it_again(tmp_pat
     (exhibit,) = read_exhibits(tmp_path / "r")
     assert exhibit.command == "cembench theory flat-disk --iterations 10 --faces 100"
     assert exhibit.facts["vertices"] == result.facts["vertices"]
+    assert exhibit.origin == "surface"
+
+
+def test_the_exhibit_of_a_stand_in_says_so(tmp_path):
+    import cembench
+
+    cembench.theory("cowboy-hat-stand-in", faces=400, iterations=5, run=tmp_path / "r")
+    assert read_exhibits(tmp_path / "r")[0].origin == "stand-in"
 
 
 def test_another_algorithms_course_stands_beside_cems_where_it_is_installed():
