@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 from benchmarks.origins import changed, origins, working_tree
@@ -60,6 +61,13 @@ def measured_seconds(report: str) -> float:
     return sum(sum(json.loads(row["seconds_raw"] or "[]")) for row in text_rows(ROOT / report))
 
 
+def confirmed_words(how: Mapping[str, Any] | None) -> str:
+    """Return when a kept report was confirmed by a shorter run, and by how many cells."""
+    if how is None:
+        return ""
+    return f"; confirmed {how['date']} at `{how['commit']}` by {how['cells']} cells"
+
+
 def stale(*, check: bool = False, refresh: bool = False) -> Section:
     """List kept reports and tables in pages, with what has changed since they were made.
 
@@ -80,7 +88,8 @@ def stale(*, check: bool = False, refresh: bool = False) -> Section:
         rows.append(
             {
                 "what": what,
-                **{name: about[name] for name in ("commit", "date", "command")},
+                **{name: about[name] for name in ("commit", "command")},
+                "date": about["date"] + confirmed_words(about.get("confirmed")),
                 "changed": ", ".join(differing) or "nothing",
                 "took": words,
                 "seconds": seconds,
