@@ -80,21 +80,10 @@ def test_angles_are_below_those_of_lscm_on_real_surfaces(name):
         assert all_metrics(mesh, f(mesh).uv)["angle_error_mean_deg"] < 1.01 * pinned
 
 
-def test_a_flat_surface_comes_out_as_it_is():
-    mesh = flat_disk(300, stretch=2.0)
-    for f in (abf_linear, abf_plus_plus):
-        assert all_metrics(mesh, f(mesh).uv)["angle_error_mean_deg"] < 1e-6
-
-
 def test_no_step_takes_an_angle_to_zero():
     angles, share = kept_positive(np.array([[0.1, 1.0, 2.0]]), np.array([[-0.2, 0.1, 0.1]]))
     assert share == pytest.approx(0.45)
     assert angles.min() == pytest.approx(0.01)
-
-
-def test_too_few_steps_are_a_failure():
-    with pytest.raises(AlgorithmFailed, match="not converged after 1 Newton steps"):
-        abf_plus_plus(uneven(), max_iterations=1)
 
 
 def test_constraints_that_rounding_makes_dependent_are_a_failure(monkeypatch):
@@ -102,3 +91,9 @@ def test_constraints_that_rounding_makes_dependent_are_a_failure(monkeypatch):
     flat = mesh.moved(mesh.V * [1.0, 1e-9, 1e-9])
     with pytest.raises(AlgorithmFailed, match=r"the sharpest angle is|not converged"):
         abf_plus_plus(flat)
+
+
+def test_a_flat_surface_comes_out_as_it_is():
+    mesh = flat_disk(300, stretch=2.0)
+    for f in (abf_linear, abf_plus_plus):
+        assert all_metrics(mesh, f(mesh).uv)["angle_error_mean_deg"] < 1e-6

@@ -71,11 +71,6 @@ def test_a_boundary_beyond_numbers_is_a_failure():
         bff(DiskMesh.from_arrays(*gallery.flat_rectangle(4, 160)), last_resort=False)
 
 
-def test_too_few_sweeps_are_a_failure():
-    with pytest.raises(AlgorithmFailed, match="not converged after 1 sweeps"):
-        bff(hemi_ellipsoid(300), max_sweeps=1, last_resort=False)
-
-
 def test_a_developable_surface_is_unrolled_as_it_is():
     flat = flat_disk(600, stretch=2.0)
     t = flat.V[:, 0]

@@ -5,14 +5,13 @@ from cembench.algorithms.cem import cem
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.sheets import swiss_roll
 
-from cembench import AlgorithmFailed, DiskMesh
+from cembench import DiskMesh
 from cembench.conformal.boundary_iteration import inverted
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
 from cembench.linear_algebra.cholesky import available_backends, linear_algebra
 from cembench.linear_algebra.cholmod import CholmodFactor
 from cembench.mesh.files import read_mesh
-from tests import gallery
 from tests.real_meshes import real_mesh
 
 
@@ -152,18 +151,6 @@ def test_zero_has_no_inverse_and_raises_no_warning():
     inverse = inverted(np.array([0, 2, 1j, 1e-300]))
     np.testing.assert_array_equal(inverse[:3], [0, 0.5, 1j])
     assert inverse[3] == 0  # its square underflows: as good as zero
-
-
-def test_a_mesh_without_interior_is_a_failure_with_its_cause():
-    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 5))
-    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
-        cem(strip)
-
-
-def test_intrinsic_delaunay_weights_are_an_option():
-    mesh = hemi_ellipsoid(3000, z=6.0)
-    assert abs(cem(mesh, delaunay=True).uv - cem(mesh).uv).max() > 1e-6
-    assert all_metrics(mesh, cem(mesh, delaunay=True).uv)["flipped_triangles"] == 0
 
 
 def test_boundary_vertices_do_not_change_places_on_a_crowded_boundary():

@@ -120,9 +120,3 @@ def test_chords_are_refused_with_the_remedy():
 def test_a_broken_triangle_is_a_failure_with_its_count():
     with pytest.raises(AlgorithmFailed, match=r"1 of 1350 triangles cannot keep the triangle"):
         cetm_free(hard_surface(0))
-
-
-@pytest.mark.parametrize("f", MAPS)
-def test_too_few_steps_are_a_failure(f):
-    with pytest.raises(AlgorithmFailed, match="after 1 Newton steps"):
-        f(uneven(), max_iterations=1)

@@ -1,10 +1,14 @@
 """What every registered algorithm must keep to, whoever wrote it."""
 
+import re
+
 import numpy as np
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import AlgorithmFailed, DiskMesh, HoledMesh, TriangleMesh
+from cembench.conformal.laplacian import non_delaunay_share
 from cembench.conformal.metrics import all_metrics
 from cembench.conformal.planar import signed_areas
 from cembench.linear_algebra.cholesky import linear_algebra
@@ -12,6 +16,9 @@ from cembench.registry import load_registry
 from tests import gallery
 
 ALGORITHMS = load_registry().algorithms
+DISKS = sorted(name for name, one in ALGORITHMS.items() if one.mesh_type is not HoledMesh)
+#: They have no map before they have converged.
+CONVERGING = ("abf++", "bff", "cetm", "cetm-flips", "cetm-free", "circle-packing", "qiem", "scp")
 
 #: How far the figures may move, relatively, when the same surface is given another way.
 SAME_FIGURES = 1e-6
@@ -41,6 +48,12 @@ def uneven_tube():
     return HoledMesh.from_arrays(V + 0.05 * np.random.default_rng(7).standard_normal(V.shape), F)
 
 
+def flat_ring():
+    i, j, F = gallery.grid(1, 8, wrap_columns=True)
+    z = (1 + i) * np.exp(2j * np.pi * j / 8)
+    return np.stack([z.real, z.imag, 0 * z.real], 1), F
+
+
 SURFACES = {
     DiskMesh: uneven_half_ellipsoid,
     TriangleMesh: uneven_half_ellipsoid,
@@ -56,6 +69,10 @@ def spec(request):
 @pytest.fixture
 def mesh(spec):
     return SURFACES[spec.mesh_type]()
+
+
+def has(spec, parameter):
+    return parameter in {one.name for one in spec.parameters}
 
 
 def run(spec, mesh):
@@ -135,12 +152,36 @@ def test_both_ways_of_solving_give_the_same_map(spec, mesh):
     assert abs(reused - fresh).max() <= SAME_MAP
 
 
-def test_a_surface_without_interior_gives_a_map_or_a_cause(spec):
-    if spec.mesh_type is HoledMesh:
-        pytest.skip("a strip has no hole")
-    strip = DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6))
+def test_a_surface_without_interior_gives_a_map_or_its_cause(spec):
+    kind = HoledMesh if spec.mesh_type is HoledMesh else DiskMesh
+    strip = kind.from_arrays(*(flat_ring() if kind is HoledMesh else gallery.flat_rectangle(1, 6)))
+    alone = {"last_resort": False} if has(spec, "last_resort") else {}
     try:
-        uv = run(spec, strip).uv
-    except AlgorithmFailed:
-        return
+        uv = spec.function(strip, **spec.arguments(alone)).uv
+    except AlgorithmFailed as error:
+        uv, why = np.zeros(0), str(error)
     assert np.isfinite(uv).all()
+    assert len(uv) or re.search("no interior vertex|edges inside join boundary vertices", why)
+
+
+@pytest.mark.parametrize("name", CONVERGING)
+def test_too_few_steps_are_a_failure_that_names_what_allows_more(name):
+    spec = ALGORITHMS[name]
+    steps = "max_sweeps" if has(spec, "max_sweeps") else "max_iterations"
+    few = {steps: 1} | ({"last_resort": False} if has(spec, "last_resort") else {})
+    with pytest.raises(AlgorithmFailed, match=rf"after 1 .*[Aa]llow more with {steps}"):
+        spec.function(hemi_ellipsoid(600), **spec.arguments(few))
+
+
+@pytest.mark.parametrize("noise", [0, 0.03])
+@pytest.mark.parametrize("name", [n for n in DISKS if has(ALGORITHMS[n], "delaunay")])
+def test_delaunay_weights_change_only_what_is_not_delaunay(name, noise):
+    spec, mesh = ALGORITHMS[name], flat_disk(600)
+    V = mesh.V + noise * np.random.default_rng(0).standard_normal(mesh.V.shape)
+    mesh = DiskMesh.from_arrays(V, mesh.F)
+    assert (non_delaunay_share(mesh) > 0) == (noise > 0)
+    own, delaunay = (
+        spec.function(mesh.fresh(), **spec.arguments({"delaunay": on})).uv for on in (False, True)
+    )
+    apart = abs(delaunay - own).max()
+    assert apart > 1e-4 if noise else apart < 1e-9

@@ -5,9 +5,7 @@ from cembench.algorithms.gu_yau import gu_yau
 from cembench.algorithms.qiem import qiem
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.metrics import all_metrics
-from tests import gallery
 
 
 def test_the_energy_falls_towards_that_of_implicit_steps():
@@ -27,8 +25,3 @@ def test_it_says_that_it_was_stopped():
     assert result.iterations == 5
     assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
     assert gu_yau(mesh, tolerance=1e-3).extras["stopped"] == "energy"
-
-
-def test_it_needs_an_interior():
-    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
-        gu_yau(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6)))

@@ -43,11 +43,6 @@ def test_positive_weights_do_not_fold(f, seed):
         assert all_metrics(mesh, result.uv)["flipped_triangles"] == 0
 
 
-def test_mean_values_need_an_interior():
-    with pytest.raises(AlgorithmFailed, match="no interior vertex"):
-        mean_value(DiskMesh.from_arrays(*gallery.flat_rectangle(1, 6)))
-
-
 @pytest.mark.parametrize("height", [1e-1, 1e-8, 1e-12])
 def test_mean_values_take_angles_near_180_degrees(height):
     """1 + cos a is lost to rounding there: the weights were infinite."""

@@ -100,7 +100,8 @@ def test_without_repair_the_map_is_as_the_method_made_it(name):
     assert (repaired.extras["fold_repairs"] > 0) == bool((own.uv != repaired.uv).any())
     if name in ("cem", "fdm", "ldm", "qiem", "harmonic-circle", "harmonic-filled", "koebe-cem"):
         assert folded > 0
-        assert all_metrics(mesh, repaired.uv)["flipped_triangles"] < folded
+        left = all_metrics(mesh, repaired.uv)["flipped_triangles"]
+        assert left < folded if spec.mesh_type is HoledMesh else left == 0
 
 
 @pytest.mark.parametrize(
