@@ -8,9 +8,13 @@ from typing import Any
 
 from cembench.api.parameterize import Result
 from cembench.conformal.metrics import circle_of, dirichlet_energy, image_area
+from cembench.core.atomic import write_bytes
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import MapStep
+from cembench.drawing import painter
+from cembench.drawing.compose import INK
 from cembench.drawing.preview import write_preview
+from cembench.drawing.scene import Board, folded_by, image_in_window, surface_in_window
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import Algorithm
 from cembench.results.exhibits import (
@@ -27,10 +31,13 @@ from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 
 from .holes import STAND_IN, HoledMaps
-from .koebe_steps import StepPanel, write_steps
+from .page import page
 
 #: Maximum number of steps in a picture; further steps are left out.
 MOST_STEPS = 4
+#: Pixels of a step's picture, how many are in a row, and how boundaries are drawn on them.
+SIDE, COLUMNS = 460, 4
+OPEN, CLOSED = {"color": "#c8553d", "linewidth": 1.8}, {"color": INK, "linewidth": 0.8}
 
 
 def examine_holes(
@@ -163,7 +170,7 @@ def _write_figure_exhibits(
     loops = (outer_loop, *others)
     picture = exhibit_folder(run, f"koebe-steps-{mesh.name}") / "steps.png"
     title = f"{mesh.name}: the steps of Koebe's method"
-    write_steps(mesh, _panels(loops, first), uv, picture, title)
+    write_bytes(picture, steps_page(mesh, loops, first, uv, title))
     words = (
         "(a) The surface. Then, in turn: one boundary (red) is left open and the others are filled,"
         " CEM makes the open one a circle; the next boundary is turned outside by an inversion at "
@@ -180,14 +187,39 @@ def _write_figure_exhibits(
     )
 
 
-def _panels(loops: Sequence[Any], steps: list[MapStep]) -> list[StepPanel]:
-    panels = [StepPanel("the surface")]
+def steps_page(
+    mesh: HoledMesh, loops: Sequence[Any], steps: Sequence[MapStep], final: Any, title: str
+) -> bytes:
+    """Return a PNG of the surface and the images of all steps, four per row.
+
+    All are under the checkerboard of the final map. Where it and an image are conformal, small
+    squares have right angles.
+    """
+    panels: list[tuple[str, Any, Any]] = [("the surface", None, None)]
     for step in steps:
-        name = "outer boundary" if step.boundary == 0 else f"hole {step.boundary}"
+        loop = loops[step.boundary]
+        name = f"hole {step.boundary}" if step.boundary else "outer boundary"
         if step.before is not None:
-            panels.append(StepPanel(f"{name} turned outside", step.before, loops[step.boundary]))
-        panels.append(StepPanel(f"{name} made a circle", step.uv, loops[step.boundary]))
-    return panels
+            panels.append((f"{name} turned outside", step.before, loop))
+        panels.append((f"{name} made a circle", step.uv, loop))
+    space = surface_in_window(mesh)
+    board = Board.of(mesh.F, space, final)
+    pictures, notes, marks = [], [], {}
+    for number, (label, uv, opened) in enumerate(panels):
+        folded = folded_by(final if uv is None else uv, mesh.F)
+        if uv is None:
+            drawn = painter.surface_panel(mesh.F, space, SIDE)
+        else:
+            drawn = painter.image_panel(mesh.F, space, uv, folded, SIDE)
+            curves = ((loop, image_in_window(uv)[[*loop, loop[0]], :2]) for loop in mesh.loops)
+            marks[divmod(number, COLUMNS)] = [
+                (curve, OPEN if set(loop) == set(opened) else CLOSED) for loop, curve in curves
+            ]
+        pictures.append(painter.paint(drawn, painter.checkerboard(drawn, board), folded))
+        notes.append(f"({chr(ord('a') + number)}) {label}")
+    rows = [pictures[k : k + COLUMNS] for k in range(0, len(panels), COLUMNS)]
+    words = [notes[k : k + COLUMNS] for k in range(0, len(panels), COLUMNS)]
+    return page(rows, [title], notes=words, marks=marks)
 
 
 def _steps_table(loops: Sequence[Any], steps: list[MapStep]) -> ExhibitTable:

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from cembench.core.atomic import write_bytes
@@ -27,12 +24,14 @@ from cembench.results.exhibits import (
 from cembench.results.papers import usual_paper
 from cembench.results.records import MeshOrigin
 
-Complex = NDArray[np.complex128]
-Picture = NDArray[np.uint8]
-Grid = Sequence[Sequence[Picture]]
+from .page import page
 
-DPI = 100
-INK, TARGET, PLACE = "#22384d", "#ffffff", "#d11c21"
+Picture = NDArray[np.uint8]
+
+#: How landmarks and their targets are marked.
+_DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}
+PLACE = _DOT | {"markersize": 5, "color": "#d11c21"}
+TARGET = _DOT | {"markersize": 10, "markerfacecolor": "none", "markeredgecolor": "#ffffff"}
 #: Number of frames of a strip, and the views of its rows.
 FRAMES, STRIP_VIEWS = 7, ("front", "three-quarter")
 
@@ -118,7 +117,7 @@ def strip_page(morph: Morph, side: int = 240) -> bytes:
     for time in times:
         at = np.flatnonzero(np.isclose(knots, time))
         heads.append(f"t = {time:.2f}" + (f"\n{morph.meshes[at[0]].name}" if len(at) else "\n"))
-    return _page(rows, heads, list(STRIP_VIEWS))
+    return page(rows, heads, sides=STRIP_VIEWS)
 
 
 def registration_page(
@@ -138,11 +137,17 @@ def registration_page(
             rows[row].append(surface)
             rows[row + 1].append(image)
     places = morph.landmarks.vertices
-    targets = morph.aligned[0][places[:, 0]]
-    marks: dict[tuple[int, int], tuple[Complex, Complex]] = {}
+    marks: dict[tuple[int, int], Any] = {}
     for k in range(len(morph.meshes)):
-        marks[1, k] = morph.maps[k][places[:, k]], np.empty(0, dtype=np.complex128)
-        marks[3, k] = registered[k][places[:, k]], targets
+        first, own, moved = (
+            FILL * np.stack([z.real, z.imag], axis=1)
+            for z in (
+                morph.aligned[0][places[:, 0]],
+                morph.maps[k][places[:, k]],
+                registered[k][places[:, k]],
+            )
+        )
+        marks |= {(1, k): [(own, PLACE)], (3, k): [(moved, PLACE), (first, TARGET)]}
     numbers = range(1, len(morph.meshes) + 1)
     after = ["m1 f1", *(f"r{k}" for k in numbers[1:])]
     heads = [f"M{k}: {mesh.name}" for k, mesh in zip(numbers, morph.meshes, strict=True)]
@@ -152,58 +157,4 @@ def registration_page(
         [f"M{k} under the board of {name}" for k, name in zip(numbers, after, strict=True)],
         [f"{name}, landmarks registered" if k else name for k, name in enumerate(after)],
     ]
-    return _page(rows, heads, None, notes, marks)
-
-
-def _page(
-    rows: Grid,
-    heads: Sequence[str],
-    sides: Sequence[str] | None,
-    notes: Sequence[Sequence[str]] | None = None,
-    marks: dict[tuple[int, int], tuple[Complex, Complex]] | None = None,
-) -> bytes:
-    """Return a page of equally large pictures, with text above columns, beside rows, and below."""
-    side = len(rows[0][0])
-    top, left, below = 46, 24 if sides else 6, 24 if notes else 4
-    width = left + side * len(rows[0]) + 6
-    height = top + (side + below) * len(rows) + 4
-    figure = Figure(figsize=(width / DPI, height / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(figure)
-    text_style: dict[str, Any] = {"color": INK, "ha": "center", "va": "center", "parse_math": False}
-    for k, head in enumerate(heads):
-        x = (left + (k + 0.5) * side) / width
-        figure.text(x, 1 - top / 2 / height, head, fontsize=10, weight="bold", **text_style)
-    for r, pictures in enumerate(rows):
-        bottom = height - top - r * (side + below) - side
-        if sides:
-            figure.text(
-                left / 2 / width,
-                (bottom + side / 2) / height,
-                sides[r],
-                rotation=90,
-                fontsize=10,
-                **text_style,
-            )
-        for k, picture in enumerate(pictures):
-            axes = figure.add_axes(
-                ((left + k * side) / width, bottom / height, side / width, side / height)
-            )
-            axes.imshow(picture, extent=(-1, 1, -1, 1), interpolation="nearest")
-            axes.set_axis_off()
-            if marks and (r, k) in marks:
-                for z, style in zip(marks[r, k], _STYLES, strict=True):
-                    axes.plot(FILL * z.real, FILL * z.imag, **style)
-            if notes:
-                x = (left + (k + 0.5) * side) / width
-                figure.text(x, (bottom - below / 2) / height, notes[r][k], fontsize=9, **text_style)
-    buffer = io.BytesIO()
-    figure.savefig(buffer, format="png", dpi=DPI, metadata={"Software": None})
-    return buffer.getvalue()
-
-
-_DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}
-#: Colours of landmarks and of their targets.
-_STYLES = (
-    _DOT | {"markersize": 5, "color": PLACE},
-    _DOT | {"markersize": 10, "markerfacecolor": "none", "markeredgecolor": TARGET},
-)
+    return page(rows, heads, notes=notes, marks=marks)
