@@ -8,7 +8,7 @@ import psutil
 import pytest
 
 from benchmarks import aa
-from tests.results.test_comparison import record_of
+from tests.records import record_of
 
 
 def run(twin, other):

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from cembench.commands.console import PlainConsole
 from cembench.results.store import Store
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 
 HOSTILE = ("[/fast]", "[bold red]x", ":smile:", "[link=file:///etc]x[/link]", "a\x1b[31mb", "[")
 
@@ -48,11 +48,9 @@ def test_every_verb_that_shows_records_shows_hostile_names(cli, name):
             record_of([factor, factor], algorithm="hostile", mesh="hat"),
             record_of([], algorithm="cem", mesh="hat"),
         ]
-        cause = records[1].outcome.model_copy(update={"cause": name, "traceback": name})
-        records[0] = records[0].model_copy(update={"title": name, "target": name})
-        records[1] = records[1].model_copy(update={"outcome": cause, "title": name})
-        for record in records:
-            Store(cli.folder / run).save(record, None, {"id": "e"})
+        hostile = {"target": name}, {"outcome": {"cause": name, "traceback": name}}
+        for record, fields in zip(records, hostile, strict=True):
+            Store(cli.folder / run).save(changed(record, title=name, **fields), None, {"id": "e"})
     code, out, err = cli("status", "one")
     assert (code, shown in out, err) == (0, True, "")
     code, out, _ = cli("show", "hat/hostile", "--run", "one")

@@ -6,7 +6,7 @@ from rich.console import Console
 
 from cembench.commands.progress import LiveProgress, PlainProgress, Remaining, duration
 from cembench.running.watcher import Step
-from tests.results.test_comparison import record_of
+from tests.records import record_of
 
 
 def test_what_remains_is_judged_by_each_cell_s_last_process():

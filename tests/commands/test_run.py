@@ -3,7 +3,7 @@ import json
 import pytest
 
 from cembench.results.store import Store
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 from tests.running.test_local import FAULTY
 
 ROUNDS = [1.0, 1.1, 0.9, 1.0, 1.0, 1.2]
@@ -20,12 +20,9 @@ def runs(cli):
         ]
         if name == "two":
             failed = record_of([], algorithm="ldm", mesh="hat")
-            cause = failed.outcome.model_copy(update={"cause": "it gave up"})
-            records.append(failed.model_copy(update={"outcome": cause}))
+            records.append(changed(failed, outcome={"cause": "it gave up"}))
         for record in records:
-            store.save(
-                record.model_copy(update={"environment": name}), None, {"id": name, "cpu": name}
-            )
+            store.save(changed(record, environment=name), None, {"id": name, "cpu": name})
     return cli
 
 

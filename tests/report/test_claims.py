@@ -12,8 +12,9 @@ from cembench.registry import load_registry
 from cembench.report.content.claims import at_a_glance, claims, counted, verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
-from cembench.results.records import Cell, Outcome, Record, Round
+from cembench.results.records import Round
 from tests import gallery
+from tests.records import changed, record_of
 from tests.report.small_run import write_run
 
 
@@ -94,8 +95,7 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
     def with_folds(record):
         is_it = record.cell.mesh_hash == vase.mesh_hash and record.cell.algorithm == "cem"
         extras = {"folded_before_repair": 119, "fold_repairs": 1} if is_it else {}
-        outcome = record.outcome.model_copy(update={"extras": record.outcome.extras | extras})
-        return record.model_copy(update={"outcome": outcome})
+        return changed(record, outcome={"extras": record.outcome.extras | extras})
 
     records = tuple(map(with_folds, evidence.records))
     claim = claim_of(replace(evidence, records=records), "no-folding")
@@ -140,8 +140,7 @@ def with_seconds(evidence, seconds_of):
     for record in evidence.records:
         if record.outcome.rounds and record.cell.solves == "reuse":
             rounds = tuple(Round(sitting="s", calls=(t,)) for t in seconds_of(record))
-            outcome = record.outcome.model_copy(update={"rounds": rounds})
-            records.append(record.model_copy(update={"outcome": outcome}))
+            records.append(changed(record, outcome={"rounds": rounds}))
     return replace(evidence, records=tuple(records))
 
 
@@ -191,8 +190,7 @@ def test_seconds_on_large_surfaces_need_rounds_too(evidence):
             return [0.5] * rounds[record.mesh.paper_row]
 
         few = with_seconds(evidence, seconds_of)
-        grown = [r.model_copy(update={"mesh": r.mesh.model_copy(update={"faces": 200_000})})
-                 for r in few.records]  # fmt: skip
+        grown = [changed(r, mesh={"faces": 200_000}) for r in few.records]
         return claim_of(replace(few, records=tuple(grown)), "less-than-one-second")
 
     some = large({"Chinese Vase": 1, "Liu's Neutral Face": 6, "": 1})
@@ -304,23 +302,16 @@ def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
     pulled[hole] = uv[hole].mean() + 1.2 * (uv[hole] - uv[hole].mean()).real
     pulled[hole] += 1j * (uv[hole] - uv[hole].mean()).imag
     koebe = load_registry().algorithm("koebe-cem")
+    about = {"title": koebe.title, "target": koebe.target, "mesh": evidence.records[0].mesh}
     records = []
     for code, z in (("c", uv), ("d", pulled)):
-        cell = Cell(
-            algorithm="koebe-cem", code_hash=code, mesh="holes", mesh_hash=mesh.hash, solves="reuse"
-        )
-        facts = evidence.records[0].mesh
         metrics = all_metrics(mesh, z)
         off = {"circularity_before_rounding": metrics["boundary_circularity"]}
         records.append(
-            Record(
-                cell=cell,
-                title=koebe.title,
-                target=koebe.target,
-                mesh=facts,
-                outcome=Outcome(status="ok", metrics=metrics, extras=off),
-                environment="machine",
-                started_at="2026-01-01T00:00:00+00:00",
+            changed(
+                record_of(algorithm="koebe-cem", code_hash=code, mesh="holes", mesh_hash=mesh.hash),
+                outcome={"status": "ok", "metrics": metrics, "extras": off},
+                **about,
             )
         )
     for chosen, verdict in (

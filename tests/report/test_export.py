@@ -7,7 +7,7 @@ from pyarrow import parquet
 from cembench.core.errors import RecordError
 from cembench.report.export import Format, export_rows
 from cembench.results.columns import row, rows
-from tests.results.test_comparison import record_of
+from tests.records import record_of
 
 RECORDS = [
     record_of([2.0] * 6, algorithm="slow", parameters={"steps": 3}),

@@ -12,6 +12,7 @@ from cembench.report.content.report import is_of_the_paper
 from cembench.report.declared_plots import declared_plot
 from cembench.report.document import VERDICTS, Claim, plain
 from cembench.results.papers import find_paper
+from tests.records import changed
 from tests.report.small_run import write_run
 
 
@@ -54,8 +55,7 @@ def test_the_fastest_is_named_among_maps_as_good_with_an_interval(evidence):
 
 def test_of_few_rounds_no_winner_is_named(evidence):
     def first_round(record):
-        outcome = record.outcome.model_copy(update={"rounds": record.outcome.rounds[:1]})
-        return record.model_copy(update={"outcome": outcome})
+        return changed(record, outcome={"rounds": record.outcome.rounds[:1]})
 
     on_one = without(evidence, lambda r: r.mesh.paper_row != "Liu's Neutral Face")
     few = replace(on_one, records=tuple(map(first_round, on_one.records)))
@@ -114,14 +114,13 @@ def test_the_papers_own_claim_stands_beside_what_was_measured(evidence):
 
 def test_the_papers_own_claim_has_intervals_over_enough_models(evidence):
     def on(record, k, model):
-        cell = record.cell.model_copy(update={"mesh": model, "mesh_hash": model})
-        facts = record.mesh.model_copy(update={"paper_row": model, "origin": "model"})
-        slow = k if cell.algorithm == "fdm" else 1
-        rounds = tuple(
-            r.model_copy(update={"calls": (slow * r.seconds,)}) for r in record.outcome.rounds
+        slow = k if record.cell.algorithm == "fdm" else 1
+        return changed(
+            record,
+            {"calls": [(slow * r.seconds,) for r in record.outcome.rounds]},
+            cell={"mesh": model, "mesh_hash": model},
+            mesh={"paper_row": model, "origin": "model"},
         )
-        outcome = record.outcome.model_copy(update={"rounds": rounds})
-        return record.model_copy(update={"cell": cell, "mesh": facts, "outcome": outcome})
 
     vase = without(evidence, lambda r: r.mesh.paper_row != "Chinese Vase")
     records = [r for r in vase.records if r.cell.solves == "reuse" and r.outcome.status == "ok"]
@@ -144,13 +143,14 @@ def with_angles(evidence, **angles):
     for name, errors in angles.items():
         base = known[name.replace("_", "-")]
         for k, error in enumerate(errors):
-            cell = base.cell.model_copy(update={"mesh": f"mine-{k}", "mesh_hash": f"{k}"})
-            facts = base.mesh.model_copy(update={"paper_row": "", "origin": "surface"})
             metrics = base.outcome.metrics | {"angle_error_mean_deg": error}
-            status = {"status": "ok" if error else "failed", "metrics": metrics}
-            outcome = base.outcome.model_copy(update=status)
-            update = {"cell": cell, "mesh": facts, "outcome": outcome}
-            records.append(base.model_copy(update=update))
+            one = changed(
+                base,
+                cell={"mesh": f"mine-{k}", "mesh_hash": f"{k}"},
+                mesh={"paper_row": "", "origin": "surface"},
+                outcome={"status": "ok" if error else "failed", "metrics": metrics},
+            )
+            records.append(one)
     return replace(evidence, records=tuple(records), exhibits=())
 
 
@@ -235,13 +235,7 @@ def test_a_run_is_of_the_paper_or_of_the_users_own_surfaces(
     surfaces = with_angles(evidence, cem=[1.0] * (models + stand_ins + others)).records
     origins = ["model"] * models + ["stand-in"] * stand_ins + ["surface"] * others
     records = tuple(
-        record.model_copy(
-            update={
-                "mesh": record.mesh.model_copy(
-                    update={"origin": o, "paper_row": "" if o == "surface" else "Foot"}
-                )
-            }
-        )
+        changed(record, mesh={"origin": o, "paper_row": "" if o == "surface" else "Foot"})
         for record, o in zip(surfaces, origins, strict=True)
     )
     assert is_of_the_paper(replace(evidence, records=records)) is of_paper
@@ -251,9 +245,9 @@ def test_variants_tried_on_fewer_surfaces_are_left_out_of_a_profile(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     ours = [r for r in store.records() if r.cell.algorithm == "cem"]
     (one,) = [r for r in ours if r.mesh.paper_row == "Chinese Vase"]
-    cell = one.cell.model_copy(update={"parameters": {"max_iterations": 3}})
     evidence = Evidence.of(store.folder)
-    more = replace(evidence, records=(*evidence.records, one.model_copy(update={"cell": cell})))
+    other = changed(one, cell={"parameters": {"max_iterations": 3}})
+    more = replace(evidence, records=(*evidence.records, other))
     assert len(more.disk_series) == len(evidence.disk_series) + 1
     panel = declared_plot(more, "performance-profile").panels[0]
     assert {series.name for series in panel.series} == {s.label for s in evidence.disk_series}
@@ -277,8 +271,6 @@ def test_surfaces_without_a_common_round_do_not_hide_who_is_the_fastest(evidence
 
     assert "over 9 families" in words_on_speed(both)
     apart = next(r for r in both.records if r.cell.algorithm == "fdm" and r.outcome.rounds)
-    rounds = tuple(one.model_copy(update={"sitting": "later"}) for one in apart.outcome.rounds)
-    outcome = apart.outcome.model_copy(update={"rounds": rounds})
-    later = apart.model_copy(update={"outcome": outcome})
+    later = changed(apart, {"sitting": ["later"] * len(apart.outcome.rounds)})
     records = tuple(later if record is apart else record for record in both.records)
     assert "over 8 families" in words_on_speed(replace(both, records=records))

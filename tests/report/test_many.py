@@ -22,6 +22,7 @@ from cembench.report.write_report import write_report
 from cembench.results.exhibits import Exhibit, write_exhibit
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
+from tests.records import changed
 from tests.report.small_run import ok, record
 
 #: `direct-cem` is the best and slowest, `harmonic-circle` the fastest; both map all surfaces.
@@ -232,9 +233,7 @@ def of_families(run):
     held = Evidence.of(run)
     faces = {surface(k).hash for k in range(20)}
     records = [
-        r.model_copy(update={"mesh": r.mesh.model_copy(update={"family": "face"})})
-        if r.cell.mesh_hash in faces
-        else r
+        changed(r, mesh={"family": "face"}) if r.cell.mesh_hash in faces else r
         for r in held.records
     ]
     return Evidence(held.store, tuple(records), ())

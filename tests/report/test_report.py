@@ -26,6 +26,7 @@ from cembench.report.write_report import write_report
 from cembench.results.merging import merge
 from cembench.results.store import Store
 from tests.limits import tree
+from tests.records import changed
 from tests.report.sample_report import CITATION
 from tests.report.small_run import meshes, write_run
 
@@ -257,12 +258,7 @@ def test_the_verb_says_where_the_report_is(cli, small_run):
 def test_of_a_cell_measured_twice_the_later_record_counts(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     old = next(r for r in store.records() if r.cell.algorithm == "cem")
-    new = old.model_copy(
-        update={
-            "cell": old.cell.model_copy(update={"code_hash": "edited"}),
-            "started_at": "2026-02-01T00:00:00+00:00",
-        }
-    )
+    new = changed(old, cell={"code_hash": "edited"}, started_at="2026-02-01T00:00:00+00:00")
     store.save(new, None, {"id": "machine"})
     evidence = Evidence.of(store.folder)
     surface = next(s for s in evidence.surfaces if s.mesh_hash == old.cell.mesh_hash)
@@ -273,8 +269,7 @@ def test_of_a_cell_measured_twice_the_later_record_counts(tmp_path):
 def test_other_parameters_are_a_series_of_their_own(tmp_path):
     store = write_run(tmp_path / "run", ("reuse",))
     old = next(r for r in store.records() if r.cell.algorithm == "cem")
-    other = old.cell.model_copy(update={"parameters": {"inversion": False}})
-    store.save(old.model_copy(update={"cell": other}), None, {"id": "machine"})
+    store.save(changed(old, cell={"parameters": {"inversion": False}}), None, {"id": "machine"})
     evidence = Evidence.of(store.folder)
     labels = [s.label for s in evidence.series if s.algorithm == "cem"]
     assert labels == ["CEM", "CEM (inversion=False)"]
@@ -287,15 +282,13 @@ def test_algorithms_of_one_title_are_told_apart_by_their_targets_or_names(tmp_pa
     store = write_run(tmp_path / "run", ("reuse",))
     old = next(r for r in store.records() if r.cell.algorithm == "cem")
     for name, target in (("of-holes", "circular holes"), ("free", "free boundary")):
-        cell = old.cell.model_copy(update={"algorithm": name})
-        record = old.model_copy(update={"cell": cell, "target": target})
+        record = changed(old, cell={"algorithm": name}, target=target)
         store.save(record, None, {"id": "machine"})
     labels = {s.algorithm: s.label for s in Evidence.of(store.folder).series}
     assert labels["cem"] == "CEM"
     assert labels["of-holes"] == "CEM (circular holes)"
     assert labels["free"] == "CEM (free boundary)"
-    twin = old.cell.model_copy(update={"algorithm": "twin"})
-    store.save(old.model_copy(update={"cell": twin}), None, {"id": "machine"})
+    store.save(changed(old, cell={"algorithm": "twin"}), None, {"id": "machine"})
     labels = {s.algorithm: s.label for s in Evidence.of(store.folder).series}
     assert (labels["cem"], labels["twin"]) == ("CEM (cem)", "CEM (twin)")
 
@@ -304,12 +297,10 @@ def fdm_record(store, mesh_name, origin, public_program):
     """Save FDM's record on a surface of this origin with this reading; return its key."""
     old = next(r for r in store.records() if r.cell.algorithm == "fdm")
     parameters = {"public_program": public_program, "tolerance": 1e-5}
-    cell = old.cell.model_copy(
-        update={"mesh": mesh_name, "mesh_hash": mesh_name, "parameters": parameters}
-    )
-    facts = old.mesh.model_copy(update={"origin": origin})
-    store.save(old.model_copy(update={"cell": cell, "mesh": facts}), None, {"id": "machine"})
-    return cell.key
+    cell = {"mesh": mesh_name, "mesh_hash": mesh_name, "parameters": parameters}
+    record = changed(old, cell=cell, mesh={"origin": origin})
+    store.save(record, None, {"id": "machine"})
+    return record.cell.key
 
 
 def labels_of(store):
@@ -381,9 +372,7 @@ def test_other_processes_draw_the_same_pictures_and_plots(monkeypatch, tmp_path)
 def test_the_head_says_until_when_it_was_measured(evidence):
     assert "until" not in dict(facts(evidence))["rounds"]
     records = [
-        r.model_copy(
-            update={"cell": r.cell.model_copy(update={"repeats": 0, "precision": precision})}
-        )
+        changed(r, cell={"repeats": 0, "precision": precision})
         for r, precision in zip(evidence.records, [0.05, 0.1] * 100, strict=False)
     ]
     told = dict(facts(replace(evidence, records=tuple(records))))["rounds"]

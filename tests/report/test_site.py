@@ -9,12 +9,12 @@ from cembench.report import site
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Report
 from cembench.report.site import about, history, publish
-from tests.results.test_machines import record_of, run_of
+from tests.results.test_machines import cell_of, run_of
 
 
 def published(tmp_path, number, ldm_seconds, *meshes, **more):
-    records = [record_of("cem", mesh, f"e{number}", 1.0) for mesh in meshes]
-    records += [record_of("ldm", mesh, f"e{number}", ldm_seconds) for mesh in meshes]
+    records = [cell_of("cem", mesh, f"e{number}", 1.0) for mesh in meshes]
+    records += [cell_of("ldm", mesh, f"e{number}", ldm_seconds) for mesh in meshes]
     store = run_of(tmp_path / f"run-{number}", f"node-{number}", *records, **more)
     return about(Evidence.of(store.folder), f"run-{number}")
 
@@ -36,8 +36,8 @@ def test_runs_without_a_surface_in_common_are_starred(tmp_path):
 
 
 def test_ratios_are_never_formed_over_two_machines(tmp_path):
-    run_of(tmp_path / "a", "node-1", record_of("cem", "hat", "e1"))
-    store = run_of(tmp_path / "a", "node-2", record_of("ldm", "hat", "e2"))
+    run_of(tmp_path / "a", "node-1", cell_of("cem", "hat", "e1"))
+    store = run_of(tmp_path / "a", "node-2", cell_of("ldm", "hat", "e2"))
     assert about(Evidence.of(store.folder), "a").ratios == {}
 
 

@@ -15,6 +15,7 @@ from cembench.report.document import marked
 from cembench.results.columns import significant
 from cembench.results.papers import find_paper
 from cembench.results.records import LinearAlgebraWork
+from tests.records import changed
 from tests.report.small_run import ok, record, write_run
 
 PAPER = find_paper("cem")
@@ -160,8 +161,7 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
         work = LinearAlgebraWork(
             symbolic=1, numeric=counts[record.cell.algorithm], right_hand_sides=3
         )
-        outcome = record.outcome.model_copy(update={"work": work})
-        return record.model_copy(update={"outcome": outcome})
+        return changed(record, outcome={"work": work})
 
     plain = averages_table(evidence, 2, "reuse")
     assert not any("factorisations" in row[0].text for row in plain.rows)
@@ -207,8 +207,8 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     for algorithm, seconds in (("cem", 1.0), ("ldm", 8.0)):
         outcome, uv = ok(algorithm, model, seconds)
         one = record(algorithm, model, "Liu's Neutral Face", "reuse", outcome)
-        facts = one.mesh.model_copy(update={"origin": "model"})
-        store.save(one.model_copy(update={"mesh": facts}), uv, {"id": "machine", "cpu": "x"})
+        one = changed(one, mesh={"origin": "model"})
+        store.save(one, uv, {"id": "machine", "cpu": "x"})
     evidence = Evidence.of(tmp_path)
     assert [s.name for s in evidence.models if s not in evidence.one_per_model] == ["spherical-cap"]
     assert evidence.surface_for_model("Liu's Neutral Face").origin == "model"

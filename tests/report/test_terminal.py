@@ -6,7 +6,7 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.run_tables import results_table, speedups_table
 from cembench.results.records import Neighbours
 from cembench.results.store import Store
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 
 
 def printed(records):
@@ -69,12 +69,7 @@ def test_a_busy_machine_is_told_once(tmp_path):
         return shown(results_table(Evidence(Store(tmp_path), (record,), ())))
 
     record = record_of([1.0] * 6)
-    quiet, busy = Neighbours(other_cores=0.0), Neighbours(other_cores=1.0)
-    rounds = [
-        one.model_copy(update={"neighbours": busy if k < 2 else quiet})
-        for k, one in enumerate(record.outcome.rounds)
-    ]
-    outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
-    text = results_of(record.model_copy(update={"outcome": outcome}))
+    beside = [Neighbours(other_cores=one) for one in (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)]
+    text = results_of(changed(record, {"neighbours": beside}))
     assert "busy during 2 of 6 processes" in text
     assert "busy" not in results_of(record)

@@ -5,6 +5,7 @@ import pytest
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.policies import work_tables
 from cembench.results.records import LinearAlgebraWork
+from tests.records import changed
 
 #: Factorisations, right-hand sides and numbers in the factor.
 COUNTS = {"cem": (1, 10.0, 2_000_000), "qiem": (8, 30.0, 2_000_000), "ldm": (2, 5.0, 0)}
@@ -22,9 +23,7 @@ def counted(evidence):
         work = LinearAlgebraWork(
             symbolic=1, numeric=numeric, right_hand_sides=solved, entries=entries
         )
-        return record.model_copy(
-            update={"outcome": record.outcome.model_copy(update={"work": work})}
-        )
+        return changed(record, outcome={"work": work})
 
     return Evidence(evidence.store, tuple(map(with_work, evidence.records)), ())
 
@@ -65,13 +64,8 @@ def with_cem_under_backslash(counted):
 
     def anew(record):
         work = record.outcome.work.model_copy(update={"numeric": 5, "right_hand_sides": 40.0})
-        slower = tuple(
-            r.model_copy(update={"calls": tuple(2 * s for s in r.calls)})
-            for r in record.outcome.rounds
-        )
-        outcome = record.outcome.model_copy(update={"work": work, "rounds": slower})
-        cell = record.cell.model_copy(update={"solves": "backslash"})
-        return record.model_copy(update={"cell": cell, "outcome": outcome})
+        slower = {"calls": [tuple(2 * s for s in r.calls) for r in record.outcome.rounds]}
+        return changed(record, slower, cell={"solves": "backslash"}, outcome={"work": work})
 
     records = only_reuse(counted).records
     more = [anew(r) for r in records if r.cell.algorithm == "cem" and r.outcome.work]

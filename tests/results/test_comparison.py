@@ -13,28 +13,11 @@ from cembench.results.comparison import (
 from cembench.results.machines import COMPARED, differences
 from cembench.results.records import (
     DEFAULT_ROUNDS,
-    Cell,
     External,
-    MeshFacts,
-    Outcome,
-    Record,
     Round,
 )
 from cembench.results.runs_compared import compare_runs
-
-
-def record_of(seconds, sittings=None, **cell):
-    sittings = sittings or ["s"] * len(seconds)
-    rounds = tuple(Round(calls=(s,), sitting=w) for s, w in zip(seconds, sittings, strict=True))
-    return Record(
-        cell=Cell(**{"algorithm": "a", "code_hash": "c", "mesh": "m", "mesh_hash": "h"} | cell),
-        title="A",
-        target="disk",
-        mesh=MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0),
-        outcome=Outcome(status="ok" if rounds else "failed", rounds=rounds),
-        environment="e",
-        started_at="",
-    )
+from tests.records import changed, record_of
 
 
 def test_the_speedup_is_eq_33_with_its_interval():
@@ -68,14 +51,7 @@ def test_nothing_is_said_that_is_not_shown(ours, theirs, verdict, rounds):
 
 
 def shared(seconds, together, **cell):
-    record = record_of(seconds, **cell)
-    rounds = [
-        r.model_copy(update={"together": (t,)})
-        for r, t in zip(record.outcome.rounds, together, strict=True)
-    ]
-    return record.model_copy(
-        update={"outcome": record.outcome.model_copy(update={"rounds": tuple(rounds)})}
-    )
+    return changed(record_of(seconds, **cell), {"together": [(t,) for t in together]})
 
 
 NOISE = np.array([1.2, 0.8, 1.1, 0.9, 1.3, 0.7, 1.0])
@@ -103,10 +79,7 @@ def test_shared_processes_decide_only_what_separate_ones_do_not_deny(separate, w
 def test_shared_processes_count_only_where_each_round_has_one():
     ours, theirs = shared(NOISE, NOISE), shared(NOISE, NOISE)
     rounds = (*theirs.outcome.rounds[:-1], Round(calls=(1.0,), sitting="s"))
-    theirs = theirs.model_copy(
-        update={"outcome": theirs.outcome.model_copy(update={"rounds": rounds})}
-    )
-    assert not compare(ours, theirs).together
+    assert not compare(ours, changed(theirs, outcome={"rounds": rounds})).together
 
 
 def compared_runs(before, after):
@@ -192,14 +165,7 @@ def test_machines_differ_in_what_changes_seconds():
 
 
 def with_cpu(record, seconds):
-    """The record with these CPU seconds in its rounds."""
-    rounds = tuple(
-        r.model_copy(update={"cpu_seconds": s})
-        for r, s in zip(record.outcome.rounds, seconds, strict=True)
-    )
-    return record.model_copy(
-        update={"outcome": record.outcome.model_copy(update={"rounds": rounds})}
-    )
+    return changed(record, {"cpu_seconds": seconds})
 
 
 def test_cpu_seconds_are_compared_within_rounds_whatever_the_wall_clock_says():
@@ -222,7 +188,7 @@ def test_cpu_seconds_are_not_compared_where_a_round_shows_none(lost):
 
 def test_cpu_seconds_of_a_program_are_not_compared():
     ours, theirs = (with_cpu(record_of([1.0] * 6), [1.0] * 6) for _ in range(2))
-    program = ours.model_copy(update={"external": External(kind="program", name="x")})
+    program = changed(ours, external=External(kind="program", name="x"))
     assert compare_cpu(program, theirs) is None
     assert compare_cpu(theirs, program) is None
     assert compare_cpu(ours, theirs).ratio == 1

@@ -14,25 +14,19 @@ from cembench.report.document import Table
 from cembench.report.run_tables import machine_lines, results_table
 from cembench.results.machines import machine_of, marks, software_differences
 from cembench.results.merging import merge, others_of
-from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 from cembench.results.store import Store
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
+from tests.records import changed, record_of
 
-FACTS = MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0.0)
 
-
-def record_of(algorithm, mesh, environment, seconds=1.0, started="2026-01-01", status="ok"):
-    cell = Cell(algorithm=algorithm, code_hash="0", mesh=mesh, mesh_hash=mesh * 8, repeats=1)
-    rounds = (Round(sitting=environment, calls=(seconds,)),) if status == "ok" else ()
-    outcome = Outcome(status=status, rounds=rounds, uv_hash="a", metrics={})
-    return Record(
-        cell=cell,
-        title=algorithm,
-        target="disk",
-        mesh=FACTS,
-        outcome=outcome,
-        environment=environment,
-        started_at=started,
+def cell_of(algorithm, mesh, environment, seconds=1.0, started="2026-01-01", status="ok"):
+    times, sittings = ([seconds], [environment]) if status == "ok" else ([], [])
+    record = record_of(
+        times, sittings, algorithm=algorithm, mesh=mesh, mesh_hash=mesh * 8, repeats=1
+    )
+    outcome = {"status": status, "uv_hash": "a"}
+    return changed(
+        record, title=algorithm, environment=environment, started_at=started, outcome=outcome
     )
 
 
@@ -48,12 +42,12 @@ def run_of(folder, machine, *records, **more):
 def two_machines(tmp_path):
     """Machine one has the hat by both algorithms, two has hat by one of them later, and the cap."""
     one = run_of(
-        tmp_path / "1", "node-1", record_of("cem", "hat", "e1"), record_of("ldm", "hat", "e1", 4.0)
+        tmp_path / "1", "node-1", cell_of("cem", "hat", "e1"), cell_of("ldm", "hat", "e1", 4.0)
     )
     two = run_of(
         *(tmp_path / "2", "node-2"),
-        record_of("cem", "hat", "e2", 0.5, "2026-02-02"),
-        record_of("cem", "cap", "e2", 0.5),
+        cell_of("cem", "hat", "e2", 0.5, "2026-02-02"),
+        cell_of("cem", "cap", "e2", 0.5),
         python="3.13",
     )
     return one, two
@@ -82,7 +76,7 @@ def test_merging_again_changes_nothing_and_a_new_leader_takes_the_place(two_mach
     assert merge(two_machines, into).cells == 3
     assert {p: p.read_bytes() for p in (tmp_path / "all").rglob("*.json")} == before
     more = run_of(
-        *(tmp_path / "3", "node-2"), record_of("ldm", "hat", "e2"), record_of("qiem", "hat", "e2")
+        *(tmp_path / "3", "node-2"), cell_of("ldm", "hat", "e2"), cell_of("qiem", "hat", "e2")
     )
     result = merge([more], into)
     assert {r.environment for r in into.records() if r.cell.mesh == "hat"} == {"e2"}

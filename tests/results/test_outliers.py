@@ -5,15 +5,14 @@ import pytest
 from cembench.api.benchmark import Run
 from cembench.commands.benchmark import _print_run
 from cembench.results.stability import NAMED, outlier_lines, outliers
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 
 
 def map_of(algorithm, mesh, angle, *, target="disk", status="ok", **cell):
     record = record_of([1.0], algorithm=algorithm, mesh=mesh, mesh_hash=mesh, **cell)
     metrics = {} if angle is None else {"angle_error_mean_deg": angle}
-    outcome = record.outcome.model_copy(update={"metrics": metrics, "status": status})
-    update = {"title": algorithm.upper(), "target": target, "outcome": outcome}
-    return record.model_copy(update=update)
+    outcome = {"metrics": metrics, "status": status}
+    return changed(record, title=algorithm.upper(), target=target, outcome=outcome)
 
 
 #: The figures of a kept run: FDM wrecked on a stand-in, and counted as a valid map.

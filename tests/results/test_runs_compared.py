@@ -10,19 +10,12 @@ from cembench.report.run_tables import changes_table
 from cembench.results import runs_compared
 from cembench.results.columns import rows
 from cembench.results.report_records import has_records, read_rows
+from tests.records import changed, record_of
 from tests.results.test_comparison import compared_runs as compare_runs
-from tests.results.test_comparison import record_of
 
 
 def measured(seconds, kernel):
-    record = record_of(list(seconds))
-    rounds = tuple(
-        one.model_copy(update={"kernel_seconds": float(k)})
-        for one, k in zip(record.outcome.rounds, kernel, strict=True)
-    )
-    return record.model_copy(
-        update={"outcome": record.outcome.model_copy(update={"rounds": rounds})}
-    )
+    return changed(record_of(list(seconds)), {"kernel_seconds": [float(k) for k in kernel]})
 
 
 def test_a_machine_that_became_slower_is_not_the_algorithm_s_fault():

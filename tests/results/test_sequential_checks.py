@@ -4,7 +4,7 @@ import pytest
 from benchmarks import noise, precision
 from cembench.results.intervals import ERROR, LOOKS, is_look, next_look, share, share_of
 from cembench.results.rank_tests import cut
-from tests.results.test_comparison import record_of
+from tests.records import record_of
 
 
 def test_all_looks_together_spend_the_error_and_each_can_exclude_something():

@@ -2,20 +2,16 @@ import pytest
 
 from cembench.results.records import Neighbours
 from cembench.results.stability import stability_words
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 
 STEADY, SHAKY, FEW = [1.0] * 7, [1, 1.2, 0.9, 1.1, 1, 1.3, 1], [1.0, 1.1]
 
 
 def timed(seconds, ended=None, busy=0, precision=0.05):
     settings = {"precision": precision, "repeats": 0} if precision else {}
-    record = record_of(seconds, **settings)
-    rounds = tuple(
-        r.model_copy(update={"neighbours": Neighbours(other_cores=1.0 if k < busy else 0.0)})
-        for k, r in enumerate(record.outcome.rounds)
-    )
-    outcome = record.outcome.model_copy(update={"rounds": rounds, "ended": ended})
-    return record.model_copy(update={"outcome": outcome})
+    cores = [1.0 if k < busy else 0.0 for k in range(len(seconds))]
+    each = {"neighbours": [Neighbours(other_cores=one) for one in cores]}
+    return changed(record_of(seconds, **settings), each, outcome={"ended": ended})
 
 
 def test_unstable_times_are_counted_with_what_ended_them():

@@ -9,25 +9,16 @@ import pytest
 from cembench.core.errors import RecordError
 from cembench.results import run_folder
 from cembench.results.merging import merge
-from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.records import Cell, Outcome
 from cembench.results.store import Store
+from tests.records import changed, record_of
 
 
 @pytest.fixture
 def record():
-    cell = Cell(algorithm="cem", code_hash="c0de", mesh="lion", mesh_hash="abc")
-    facts = MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0)
-    metrics = {"dilatation_max": float("inf"), "flipped_triangles": 0}
-    rounds = tuple(Round(calls=(s,)) for s in (0.1, 0.3, 0.2))
-    outcome = Outcome(status="ok", rounds=rounds, metrics=metrics)
-    return Record(
-        cell=cell,
-        title="CEM",
-        target="disk",
-        mesh=facts,
-        outcome=outcome,
-        environment="e",
-        started_at="2026-01-01T00:00:00",
+    one = record_of([0.1, 0.3, 0.2], algorithm="cem", mesh="lion", mesh_hash="abc")
+    return changed(
+        one, outcome={"metrics": {"dilatation_max": float("inf"), "flipped_triangles": 0}}
     )
 
 

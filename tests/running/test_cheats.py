@@ -18,7 +18,7 @@ from cembench.validation.examine import ValidationOptions, examine
 from cembench.validation.quality import quality_findings
 from cembench.validation.solver import Solver, load_solver
 from cembench.validation.verdict import sentence
-from tests.results.test_comparison import record_of
+from tests.records import record_of
 
 CHEATS = Path(__file__).with_name("cheats.py")
 #: What each comes to; None: it ends ok, with the seconds of all its work.

@@ -9,14 +9,12 @@ from cembench.running.estimate import (
     fit_power_law,
 )
 from cembench.running.usual_costs import USUAL, USUAL_BYTES
-from tests.results.test_comparison import record_of
+from tests.records import changed, record_of
 
 
 def known(faces, seconds, **cell):
-    record = record_of([seconds] * 6, **cell)
-    mesh = record.mesh.model_copy(update={"faces": faces})
-    outcome = record.outcome.model_copy(update={"peak_memory_bytes": 1000 * faces})
-    return record.model_copy(update={"mesh": mesh, "outcome": outcome})
+    memory = {"peak_memory_bytes": 1000 * faces}
+    return changed(record_of([seconds] * 6, **cell), mesh={"faces": faces}, outcome=memory)
 
 
 def test_a_power_law_is_found_again():

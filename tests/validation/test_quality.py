@@ -1,7 +1,7 @@
 import pytest
 
 from cembench.core.notices import Notice, NoticeKind
-from cembench.results.records import Cell, Fault, FaultKind, MeshFacts, Outcome, Record, Round
+from cembench.results.records import Fault, FaultKind
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
@@ -9,20 +9,16 @@ from cembench.validation.quality import (
     sides,
     without_map,
 )
+from tests.records import changed, record_of
 
 
 def record(algorithm, mesh, energy=0.01, seconds=(), *, target="disk", **outcome):
-    rounds = tuple(Round(sitting="s", calls=(t,)) for t in seconds)
     metrics = {"conformal_energy": energy, "image_area": 3.14, "angle_error_mean_deg": 1.0}
-    described = {"status": "ok", "metrics": metrics, "rounds": rounds} | outcome
-    return Record(
-        cell=Cell(algorithm=algorithm, code_hash="c", mesh=mesh, mesh_hash=mesh),
+    return changed(
+        record_of(seconds, algorithm=algorithm, mesh=mesh, mesh_hash=mesh),
         title=algorithm.upper(),
         target=target,
-        mesh=MeshFacts(vertices=9, faces=8, boundary_vertices=8, non_delaunay_share=0.0),
-        outcome=Outcome(**described),
-        environment="e",
-        started_at="",
+        outcome={"status": "ok", "metrics": metrics} | outcome,
     )
 
 
@@ -146,7 +142,7 @@ def in_gauge(algorithm, mesh, energy, gauge):
     """A record whose map has another energy in the common gauge; None: it has none there."""
     made = record(algorithm, mesh, energy)
     metrics = made.outcome.metrics | ({} if gauge is None else {"common_gauge_energy": gauge})
-    return made.model_copy(update={"outcome": made.outcome.model_copy(update={"metrics": metrics})})
+    return changed(made, outcome={"metrics": metrics})
 
 
 def test_two_disks_are_compared_in_the_common_gauge():

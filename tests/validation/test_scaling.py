@@ -16,6 +16,7 @@ from cembench.validation.scaling import (
     seconds_a_round,
     sizes,
 )
+from tests.records import changed
 from tests.validation.test_quality import record
 
 FACES = sizes(30_000)
@@ -24,15 +25,8 @@ EVEN = [1.0] * 7
 
 def timed(name, faces, walls, cpus=None, phase=0.5):
     """A record of these seconds, one a round."""
-    one = record(name, f"s{faces}", seconds=walls)
-    pairs = zip(one.outcome.rounds, walls, cpus or walls, strict=True)
-    rounds = tuple(
-        r.model_copy(update={"phases": {"factorisation": phase * wall}, "cpu_seconds": cpu})
-        for r, wall, cpu in pairs
-    )
-    outcome = one.outcome.model_copy(update={"rounds": rounds})
-    mesh = one.mesh.model_copy(update={"faces": faces})
-    return one.model_copy(update={"outcome": outcome, "mesh": mesh})
+    each = {"phases": [{"factorisation": phase * s} for s in walls], "cpu_seconds": cpus or walls}
+    return changed(record(name, f"s{faces}", seconds=walls), each, mesh={"faces": faces})
 
 
 def power(name, exponent, slower=EVEN, cpu=True):
@@ -128,9 +122,7 @@ def test_rounds_of_several_sittings_are_paired_within_each():
     assert (one.above_low, one.above_high) == pytest.approx((0.2, 0.2))
     assert one.ours.high > 1.2 + log(2) / log(3)
     lost = [
-        r.model_copy(update={"outcome": r.outcome.model_copy(update={"status": "failed"})})
-        if r.cell.algorithm == "ours"
-        else r
+        changed(r, outcome={"status": "failed"}) if r.cell.algorithm == "ours" else r
         for r in largest
     ]
     assert growth_of([first, lost], "ours", "cem") is None
