@@ -2,6 +2,7 @@
 
 import numpy as np
 from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.holed_disk import disk_with_holes
 
 from cembench import DiskMesh, HoledMesh
@@ -67,6 +68,12 @@ def tetrahedron():
     return V, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
+def octahedron():
+    V = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
+    F = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
+    return V, np.array(F)
+
+
 def bow_tie():
     """Two triangles that touch in one vertex."""
     V = np.array([[0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]], float)
@@ -81,6 +88,12 @@ def three_triangles_on_an_edge():
 def two_pieces():
     V, F = flat_rectangle()
     return np.concatenate([V, V + 100]), np.concatenate([F, F + len(V)])
+
+
+def uneven(faces=1500, x=2.0):
+    """Half an ellipsoid with a little noise: no symmetry, and no edge between equals."""
+    mesh = hemi_ellipsoid(faces, x=x)
+    return mesh.moved(mesh.V + 0.01 * np.random.default_rng(7).standard_normal(mesh.V.shape))
 
 
 def crumpled_disk():

@@ -5,30 +5,24 @@ from cembench.algorithms.abf.linear import abf_linear
 from cembench.algorithms.abf.plus_plus import abf_plus_plus
 from cembench.algorithms.lscm import lscm
 from cembench.surfaces.flat_disk import flat_disk
-from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
 from cembench import AlgorithmFailed
 from cembench.conformal.metrics import all_metrics, corner_angles
 from cembench.mesh.files import read_mesh
+from tests import gallery
 from tests.hard_surfaces import hard_surface
 from tests.real_meshes import real_mesh
 
 
-def uneven(faces=600):
-    mesh = hemi_ellipsoid(faces, x=1.5)
-    noise = np.random.default_rng(2).standard_normal(mesh.V.shape)
-    return mesh.moved(mesh.V + 0.01 * noise)
-
-
 def test_the_angles_of_any_flat_map_meet_all_constraints():
-    mesh = uneven()
+    mesh = gallery.uneven(600)
     flat = np.deg2rad(corner_angles(lscm(mesh).uv, mesh.F))
     assert max(Angles(mesh).told(flat).values()) < 1e-9
 
 
 def test_a_step_is_the_least_change_that_meets_the_linear_constraints():
     """Against a dense solve of the whole optimality system, constraints from finite differences."""
-    mesh = uneven(60)
+    mesh = gallery.uneven(60)
     problem = Angles(mesh)
     angles = problem.wanted
     gradient = 0.1 * np.random.default_rng(0).standard_normal(angles.shape)
@@ -50,7 +44,7 @@ def test_a_step_is_the_least_change_that_meets_the_linear_constraints():
 
 
 def test_newton_meets_the_constraints_and_is_at_a_minimum():
-    mesh = uneven()
+    mesh = gallery.uneven(600)
     result = abf_plus_plus(mesh)
     assert max(result.extras[k] for k in result.extras if k.endswith("residual")) < 1e-8
     linear = abf_linear(mesh)

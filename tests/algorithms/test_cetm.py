@@ -3,7 +3,6 @@ import pytest
 from cembench.algorithms.cetm.disk import cetm
 from cembench.algorithms.cetm.free import cetm_free
 from cembench.surfaces.flat_disk import flat_disk
-from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import AlgorithmFailed, DiskMesh
@@ -20,12 +19,6 @@ from tests.real_meshes import real_mesh
 MAPS = (cetm, cetm_free)
 
 
-def uneven(faces=1500):
-    mesh = hemi_ellipsoid(faces, x=1.5)
-    noise = np.random.default_rng(2).standard_normal(mesh.V.shape)
-    return mesh.moved(mesh.V + 0.005 * noise)
-
-
 def cross_ratio(z, i, j, k, m):
     return abs((z[i] - z[k]) * (z[j] - z[m]) / ((z[k] - z[j]) * (z[m] - z[i])))
 
@@ -33,7 +26,7 @@ def cross_ratio(z, i, j, k, m):
 @pytest.mark.parametrize("f", MAPS)
 def test_length_cross_ratios_are_those_of_the_surface(f):
     """Edge by edge, from the points alone."""
-    mesh = uneven()
+    mesh = gallery.uneven()
     result = f(mesh)
     assert result.extras["curvature"] < 1e-10
     assert result.extras["fold_repairs"] == 0
@@ -65,7 +58,7 @@ def test_real_surfaces_take_few_factorisations_of_one_pattern(f, name, monkeypat
 
 
 def test_the_free_boundary_keeps_its_lengths_and_a_flat_surface_its_shape():
-    mesh = uneven()
+    mesh = gallery.uneven()
     z = cetm_free(mesh).uv[mesh.boundary]
     loop = mesh.V[mesh.boundary]
     stretch = np.abs(np.roll(z, -1) - z) / np.linalg.norm(np.roll(loop, -1, axis=0) - loop, axis=1)
@@ -75,7 +68,7 @@ def test_the_free_boundary_keeps_its_lengths_and_a_flat_surface_its_shape():
 
 
 def test_angles_from_lengths():
-    mesh = uneven()
+    mesh = gallery.uneven()
     found, broken = angles(side_lengths(mesh.V, mesh.F))
     assert not broken.any()
     assert abs(np.rad2deg(found) - corner_angles(mesh.V, mesh.F)).max() < 1e-9

@@ -12,10 +12,10 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.spherical_cap import exact_map, spherical_cap
-from scipy.optimize import least_squares
 
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
+from cembench.validation.alignment import distance
 
 RINGS = (8, 16, 32)
 FINE = 128
@@ -55,22 +55,6 @@ def mapped(name, kind, rings):
     return spec.function(surface(kind, rings), **spec.arguments(TO_THE_END.get(name, {}))).uv
 
 
-def best_distance(uv, exact):
-    """Root mean square distance after the best of the Moebius maps of the disk to itself."""
-
-    def moved(p):
-        a = complex(p[0], p[1])
-        return np.exp(1j * p[2]) * (uv - a) / (1 - np.conj(a) * uv)
-
-    def residual(p):
-        off = moved(p) - exact
-        return np.concatenate([off.real, off.imag])
-
-    turn = np.angle(np.vdot(uv, exact))
-    fit = least_squares(residual, [0.0, 0.0, turn], xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    return float(np.sqrt(2 * fit.cost / len(uv)))
-
-
 def assert_order(what, errors, at_least, negligible=1e-12):
     """Assert the order of the errors, without those that are rounding alone."""
     seen = [
@@ -85,7 +69,9 @@ def assert_order(what, errors, at_least, negligible=1e-12):
 
 
 def distances(name, kind, exact):
-    return [best_distance(mapped(name, kind, r), exact(surface(kind, r), r)) for r in RINGS]
+    return [
+        distance(mapped(name, kind, r), exact(surface(kind, r), r), moebius=True) for r in RINGS
+    ]
 
 
 @pytest.mark.parametrize("kind", ["cap", "ellipse", "ellipsoid"])

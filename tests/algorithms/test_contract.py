@@ -7,12 +7,13 @@ import pytest
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench import AlgorithmFailed, DiskMesh, HoledMesh, TriangleMesh
+from cembench import AlgorithmFailed, DiskMesh, HoledMesh
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.conformal.metrics import all_metrics
 from cembench.conformal.planar import signed_areas
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.registry import load_registry
+from cembench.validation import surfaces
 from tests import gallery
 
 ALGORITHMS = load_registry().algorithms
@@ -34,31 +35,10 @@ COMPARED = (
 )
 
 
-def uneven_half_ellipsoid():
-    """Nothing about it is symmetric, so no choice between equals hangs on rounding or numbering."""
-    mesh = hemi_ellipsoid(1500)
-    rng = np.random.default_rng(7)
-    V = mesh.V + 0.01 * rng.standard_normal(mesh.V.shape)
-    V[:, 2] += 0.3 * V[:, 0] ** 2 + 0.1 * V[:, 1]
-    return DiskMesh.from_arrays(V, mesh.F)
-
-
-def uneven_tube():
-    V, F = gallery.tube()
-    return HoledMesh.from_arrays(V + 0.05 * np.random.default_rng(7).standard_normal(V.shape), F)
-
-
 def flat_ring():
     i, j, F = gallery.grid(1, 8, wrap_columns=True)
     z = (1 + i) * np.exp(2j * np.pi * j / 8)
     return np.stack([z.real, z.imag, 0 * z.real], 1), F
-
-
-SURFACES = {
-    DiskMesh: uneven_half_ellipsoid,
-    TriangleMesh: uneven_half_ellipsoid,
-    HoledMesh: uneven_tube,
-}
 
 
 @pytest.fixture(params=sorted(ALGORITHMS))
@@ -68,7 +48,7 @@ def spec(request):
 
 @pytest.fixture
 def mesh(spec):
-    return SURFACES[spec.mesh_type]()
+    return surfaces.uneven(load_registry(), surfaces.mesh_kind(spec))
 
 
 def has(spec, parameter):
@@ -126,22 +106,11 @@ def test_the_mesh_is_left_as_it_was(spec, mesh):
 
 
 def test_rotation_translation_and_scale_do_not_matter(spec, mesh):
-    Q, _ = np.linalg.qr(np.random.default_rng(3).standard_normal((3, 3)))
-    Q *= np.sign(np.linalg.det(Q))
-    moved = type(mesh).from_arrays(40 * mesh.V @ Q.T + [1, -2, 3], mesh.F)
-    assert_same_figures(spec, mesh, moved)
+    assert_same_figures(spec, mesh, surfaces.moved(mesh))
 
 
 def test_numbering_does_not_matter(spec, mesh):
-    rng = np.random.default_rng(4)
-    number = rng.permutation(mesh.n)
-    V = np.empty_like(mesh.V)
-    V[number] = mesh.V
-    F = mesh.F[
-        np.arange(mesh.m)[:, None], (rng.integers(3, size=mesh.m)[:, None] + np.arange(3)) % 3
-    ]
-    renumbered = type(mesh).from_arrays(V, number[F][rng.permutation(mesh.m)])
-    assert_same_figures(spec, mesh, renumbered)
+    assert_same_figures(spec, mesh, surfaces.renumbered(mesh)[0])
 
 
 def test_both_ways_of_solving_give_the_same_map(spec, mesh):

@@ -19,17 +19,11 @@ from tests.real_meshes import DISKS, real_mesh
 DELAUNAY, OWN = {"delaunay": True}, {"delaunay": False}
 
 
-def uneven_half_ellipsoid(faces=1500):
-    mesh = hemi_ellipsoid(faces, x=2.0)
-    V = mesh.V + 0.01 * np.random.default_rng(7).standard_normal(mesh.V.shape)
-    return DiskMesh.from_arrays(V, mesh.F)
-
-
 def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end(count_calls):
     factored = count_calls(CholmodFactor, "_factor")
     halves = count_calls(CholmodFactor, "condensed"), count_calls(CholmodFactor, "extended")
     whole = count_calls(Cholesky, "solve"), count_calls(Cholesky, "solve_leading")
-    result = direct_cem(uneven_half_ellipsoid(), gauge="triangle")
+    result = direct_cem(gallery.uneven(), gauge="triangle")
     assert result.iterations > 0
     assert len(factored) == 1
     assert [len(calls) for calls in (*halves, *whole)] == [1, 1, 0, 0]
@@ -37,7 +31,7 @@ def test_one_factorisation_half_a_solve_for_the_start_and_half_of_one_at_the_end
 
 @pytest.mark.parametrize("gauge", ["boundary", "triangle", "area"])
 def test_energy_falls_from_step_to_step_and_is_that_of_the_map(gauge):
-    mesh = uneven_half_ellipsoid()
+    mesh = gallery.uneven()
     result = direct_cem(mesh, gauge=gauge, back=0, delaunay=False)
     assert (np.diff(result.energy_history) < 0).all()
     energy = all_metrics(mesh, result.uv)["conformal_energy"]
@@ -47,7 +41,7 @@ def test_energy_falls_from_step_to_step_and_is_that_of_the_map(gauge):
 
 
 def test_where_it_stops_energy_could_hardly_fall():
-    mesh = uneven_half_ellipsoid(600)
+    mesh = gallery.uneven(600)
     least, default = (
         direct_cem(mesh, gauge="triangle", back=0, tolerance=tolerance).energy_history[-1]
         for tolerance in (1e-13, 1e-6)
@@ -64,7 +58,7 @@ def test_the_way_back_costs_the_share_of_energy_that_it_may_and_mends_angles(del
 
 
 def test_where_it_costs_less_the_way_back_leads_to_the_start():
-    mesh = uneven_half_ellipsoid(600)
+    mesh = gallery.uneven(600)
     start, back = direct_cem(mesh, max_iterations=0), direct_cem(mesh, back=10)
     assert back.iterations > 1
     turn = np.exp(1j * np.angle(np.vdot(back.uv, start.uv)))
@@ -72,7 +66,7 @@ def test_where_it_costs_less_the_way_back_leads_to_the_start():
 
 
 def test_it_is_below_cem_with_the_same_weights_however_many_iterations_cem_takes():
-    mesh = uneven_half_ellipsoid()
+    mesh = gallery.uneven()
     least, default = (
         all_metrics(mesh, direct_cem(mesh, delaunay=False, **p).uv) for p in ({"back": 0}, {})
     )
@@ -96,7 +90,7 @@ def test_on_the_chinese_lion_its_minimum_is_below_what_cem_converges_to():
 
 
 def test_the_gauge_brings_what_it_names_to_the_origin():
-    mesh = uneven_half_ellipsoid()
+    mesh = gallery.uneven()
     uv = direct_cem(mesh, gauge="triangle").uv
     middle = np.linalg.norm(mesh.V[mesh.F].mean(axis=1) - mesh.V.mean(axis=0), axis=1).argmin()
     assert abs(uv[mesh.F[middle]].mean()) < 1e-10
@@ -138,14 +132,14 @@ def test_every_backend_gives_the_same_map(backend):
 
 
 def test_no_iteration_leaves_the_start():
-    result = direct_cem(uneven_half_ellipsoid(), max_iterations=0)
+    result = direct_cem(gallery.uneven(), max_iterations=0)
     assert result.iterations == 0
     assert result.extras["stopped"] == "iterations"
     assert result.extras["start"] in ("harmonic measure", "arc length")
 
 
 def test_the_start_is_the_better_of_two(monkeypatch):
-    mesh = uneven_half_ellipsoid()
+    mesh = gallery.uneven()
     energy = direct_cem(mesh, max_iterations=0).energy_history[0]
     uv = direct_cem(mesh, max_iterations=0, delaunay=False).uv
     assert direct_cem(mesh, max_iterations=0, delaunay=False).energy_history[0] == pytest.approx(
@@ -223,5 +217,5 @@ def test_half_of_the_vertices_on_the_boundary():
 
 def test_products_with_the_hessian_are_few(count_calls):
     calls = count_calls(EnergyModel, "hessian")
-    result = direct_cem(uneven_half_ellipsoid())
+    result = direct_cem(gallery.uneven())
     assert len(calls) == result.extras["hessian_products"] <= 20

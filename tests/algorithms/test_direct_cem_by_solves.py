@@ -24,13 +24,6 @@ from cembench.mesh.files import read_mesh
 from tests import gallery
 from tests.real_meshes import real_mesh
 
-
-def uneven(faces=3000, x=2.0):
-    mesh = hemi_ellipsoid(faces, x=x)
-    V = mesh.V + 0.01 * np.random.default_rng(7).standard_normal(mesh.V.shape)
-    return DiskMesh.from_arrays(V, mesh.F)
-
-
 #: E_C grows along the way back to (1 + .01) of the least. Seen from there, a minimum that is short
 #: of the least by the share 1e-6 differs by up to 2 (.01 1e-6)^(1/2).
 AFTER_WAY_BACK = 2e-4
@@ -38,7 +31,7 @@ AFTER_WAY_BACK = 2e-4
 USUAL = disk.SURELY_MORE
 
 SURFACES = {
-    "half ellipsoid": uneven,
+    "half ellipsoid": lambda: gallery.uneven(3000),
     "rectangle": lambda: DiskMesh.from_arrays(*gallery.flat_rectangle(30, 60)),
     "lion": lambda: read_mesh(real_mesh("chinese_lion.obj")),
     "human face": lambda: read_mesh(real_mesh("human_face.obj")),
@@ -82,7 +75,7 @@ def test_energy_and_folds_are_those_of_the_other_way(way, surface, options):
 
 @pytest.mark.parametrize("gauge", ["triangle", "area"])
 def test_every_gauge_is_kept(way, gauge):
-    mesh = uneven()
+    mesh = gallery.uneven(3000)
     (usual, _), (other, taken) = (way(mesh, solves, gauge=gauge) for solves in (False, True))
     assert taken
     assert min(other.energy_history) == pytest.approx(min(usual.energy_history), rel=1e-6)
@@ -90,7 +83,7 @@ def test_every_gauge_is_kept(way, gauge):
 
 
 def test_one_sparse_factorisation_and_a_solve_a_step(way, count_calls):
-    mesh, solves = uneven(), count_calls(InteriorLaplacian, "harmonic_near")
+    mesh, solves = gallery.uneven(3000), count_calls(InteriorLaplacian, "harmonic_near")
     ends = count_calls(Cholesky, "schur_factor")
     with counting() as work:
         found, taken = way(mesh, True, back=0)
@@ -137,7 +130,7 @@ def test_the_estimate_is_monotonic():
     ids=["too many steps", "steps that lower the energy less than predicted"],
 )
 def test_what_it_gives_up_is_mapped_the_usual_way_to_the_bit(way, monkeypatch, name, value):
-    mesh = uneven()
+    mesh = gallery.uneven(3000)
     usual, _ = way(mesh, False)
     monkeypatch.setattr(quasi_newton, name, value)
     other, taken = way(mesh, True)
@@ -179,7 +172,7 @@ def parts(mesh, measure=None):
 
 
 def test_products_measure_and_maps_are_those_of_the_factor_with_the_boundary_last():
-    mesh = uneven(1500)
+    mesh = gallery.uneven(1500)
     measure = np.random.default_rng(0).random((mesh.n, 3))
     measure[mesh.interior, 1] = 0
     measure[mesh.interior[3:], 2] = 0
@@ -196,7 +189,7 @@ def test_products_measure_and_maps_are_those_of_the_factor_with_the_boundary_las
 
 
 def test_a_turned_boundary_takes_no_solve(count_calls):
-    mesh = uneven(600)
+    mesh = gallery.uneven(600)
     _, interior, arcs = parts(mesh)
     z = np.exp(1j * np.cumsum(arcs))
     first = interior.harmonic_near(z)

@@ -9,6 +9,7 @@ from cembench.conformal.metrics import all_metrics, boundary_circles
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.linear_algebra.cholmod import CholmodFactor
 from cembench.mesh.files import read_mesh
+from cembench.validation.alignment import distance
 from tests import gallery
 from tests.real_meshes import real_mesh
 
@@ -26,13 +27,6 @@ REAL = {  # mean angle error, degrees, that the map stays below
 }
 
 
-def moebius_distance(z, w):
-    """How far, at most, is w from the Moebius image of z that fits best?"""
-    system = np.stack([z, np.ones_like(z), -z * w, -w], axis=1)
-    a, b, c, d = np.linalg.svd(system)[2][-1].conj()
-    return abs((a * z + b) / (c * z + d) - w).max()
-
-
 def warped(centres, radii, faces):
     """A disk with round holes, and what exp made of it: a domain whose conformal image is known."""
     V, F = disk_with_holes(np.asarray(centres), np.asarray(radii), faces)
@@ -48,7 +42,7 @@ def test_on_plane_domains_with_known_circles_the_error_falls_at_second_order(cen
     errors = []
     for faces in (600, 9600):
         z, mesh = warped(centres, radii, faces)
-        errors.append(moebius_distance(direct_cem_holes(mesh).uv, z))
+        errors.append(distance(direct_cem_holes(mesh).uv, z, moebius=True))
     assert np.log2(errors[0] / errors[1]) / 2 > 1.6, errors
 
 

@@ -25,28 +25,10 @@ from cembench.api.surface_collections import (
 from cembench.core.errors import ParameterError
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
+from tests import gallery
 
-
-def sphere():
-    V = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [-1, 0, 0], [0, -1, 0], [0, 0, -1.0]])
-    F = [[0, 1, 2], [1, 3, 2], [3, 4, 2], [4, 0, 2], [1, 0, 5], [3, 1, 5], [4, 3, 5], [0, 4, 5]]
-    for _ in range(3):
-        V, F = igl.upsample(V, np.array(F))
-    return TriangleMesh.from_arrays(V / np.linalg.norm(V, axis=1, keepdims=True), F)
-
-
-def torus():
-    u, v = np.meshgrid(np.arange(12), np.arange(8), indexing="ij")
-    a, b = 2 * np.pi * u.ravel() / 12, 2 * np.pi * v.ravel() / 8
-    ring = 3 + np.cos(b)
-    V = np.stack([ring * np.cos(a), ring * np.sin(a), np.sin(b)], axis=1)
-    at = lambda i, j: (i % 12) * 8 + j % 8  # noqa: E731
-    F = []
-    for i in range(12):
-        for j in range(8):
-            p, q, r, s = at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)
-            F += [(p, q, r), (p, r, s)]
-    return TriangleMesh.from_arrays(V, F)
+BALL = TriangleMesh.from_arrays(*igl.upsample(*gallery.octahedron(), 3))
+TORUS = TriangleMesh.from_arrays(*gallery.torus())
 
 
 @pytest.fixture
@@ -55,8 +37,8 @@ def folder(tmp_path):
     (where / "deeper").mkdir(parents=True)
     write_mesh(where / "disk.obj", flat_disk(100))
     write_mesh(where / "deeper" / "holes.ply", holed_disk(600))
-    write_mesh(where / "ball.off", sphere())
-    write_mesh(where / "torus.stl", torus())
+    write_mesh(where / "ball.off", BALL)
+    write_mesh(where / "torus.stl", TORUS)
     (where / "broken.obj").write_text("v 0 0 0\nf 1 2 3\n")
     (where / "notes.txt").write_text("no mesh")
     return where
@@ -206,9 +188,9 @@ def thingi10k(monkeypatch, tmp_path):
         }
 
     entries = [
-        entry(11, sphere(), "Creative Commons - Attribution", True, 0),
-        entry(12, sphere(), "All Rights Reserved", True, 0),
-        entry(13, torus(), "Creative Commons - Public Domain Dedication", True, 1),
+        entry(11, BALL, "Creative Commons - Attribution", True, 0),
+        entry(12, BALL, "All Rights Reserved", True, 0),
+        entry(13, TORUS, "Creative Commons - Public Domain Dedication", True, 1),
         entry(14, flat_disk(200), "Public Domain", False, None),
     ]
 

@@ -13,7 +13,7 @@ from scipy.io import savemat
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from tests import gallery
-from tests.mesh.test_repair_cuts import defective, sphere
+from tests.mesh.test_repair_cuts import defective
 
 #: Advice that no command can follow.
 BY_HAND = ("divide all coordinates by", "export or download it again")
@@ -51,7 +51,7 @@ def test_the_commands_that_an_error_names_end_in_a_map(cli, verb, V, F):
             file = command[command.index("-o") + 1]
 
 
-@pytest.mark.parametrize("surface", [gallery.flat_rectangle(4, 5), (sphere().V, sphere().F)])
+@pytest.mark.parametrize("surface", [gallery.flat_rectangle(4, 5), gallery.octahedron()])
 def test_the_options_that_an_error_names_end_in_a_map_too(cli, surface):
     """Those of `map`, and the other kind of algorithm."""
     write_raw(cli.folder / "mine.obj", *surface)

@@ -12,23 +12,12 @@ from cembench.mesh.repair import repair
 from tests import gallery
 from tests.hard_surfaces import hard_surface
 
-
-def sphere():
-    V = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], float)
-    F = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]
-    return TriangleMesh.from_arrays(V, np.array(F))
+SPHERE = TriangleMesh.from_arrays(*gallery.octahedron())
 
 
-def torus(k=8):
-    s, t = (a.ravel() for a in np.meshgrid(np.arange(k), np.arange(k), indexing="ij"))
-    u, v = 2 * np.pi * s / k, 2 * np.pi * t / k
-    r = 2 + np.cos(v)
-    V = np.stack([r * np.cos(u), r * np.sin(u), np.sin(v)], axis=1)
-    a, b, c, d = ((s + i) % k * k + (t + j) % k for i, j in ((0, 0), (1, 0), (1, 1), (0, 1)))
-    return V, np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-
-
-@pytest.mark.parametrize("closed", [sphere(), TriangleMesh.from_arrays(*torus())], ids=["S", "T"])
+@pytest.mark.parametrize(
+    "closed", [SPHERE, TriangleMesh.from_arrays(*gallery.torus())], ids=["S", "T"]
+)
 def test_a_seam_survives_a_file_and_a_repair(tmp_path, closed):
     disk = cut_open(closed).mesh
     path = tmp_path / "cut.obj"
@@ -41,7 +30,7 @@ def test_a_seam_survives_a_file_and_a_repair(tmp_path, closed):
 
 
 def test_a_seam_stays_open_beside_degenerate_triangles_and_isolated_vertices():
-    disk = cut_open(sphere()).mesh
+    disk = cut_open(SPHERE).mesh
     i, j, k = disk.F[0]
     V = np.concatenate([disk.V, disk.V[[i, j]].mean(axis=0, keepdims=True), [[9, 9, 9]]])
     F = np.concatenate([disk.F[1:], [[i, disk.n, k], [disk.n, j, k], [i, j, disk.n]]])
@@ -51,10 +40,10 @@ def test_a_seam_stays_open_beside_degenerate_triangles_and_isolated_vertices():
 
 
 def test_a_seam_is_welded_on_request():
-    disk = cut_open(sphere()).mesh
+    disk = cut_open(SPHERE).mesh
     result = repair(disk.V, disk.F, weld=0.0)
-    assert result.counts["vertices_welded"] == disk.n - sphere().n
-    assert len(result.surfaces[0][0]) == sphere().n
+    assert result.counts["vertices_welded"] == disk.n - SPHERE.n
+    assert len(result.surfaces[0][0]) == SPHERE.n
 
 
 def test_triangles_that_share_no_vertices_are_welded():
@@ -76,7 +65,7 @@ def with_more(V, F, vertices=(), triangles=()):
 def defective():
     """One surface for each kind of defect, by its name."""
     V, F = gallery.flat_rectangle(4, 5)
-    n, disk = len(V), cut_open(sphere()).mesh
+    n, disk = len(V), cut_open(SPHERE).mesh
     yield "not finite", with_more(V, F, [[np.nan, 0, 0]], [[0, 1, n]])
     yield "out of range", with_more(V, F, (), [[0, 1, n + 7]])
     yield "scale", (1e70 * V, F)
@@ -90,8 +79,8 @@ def defective():
     yield "components", with_more(V, F, V[:3] + 9, [[n, n + 1, n + 2]])
     yield "isolated", with_more(V, F, [[7, 7, 7]])
     yield "holes", (V, np.delete(F, np.flatnonzero((F[13, 0] == F).any(axis=1)), axis=0))
-    yield "closed", (sphere().V, sphere().F)
-    yield "handles", torus()
+    yield "closed", gallery.octahedron()
+    yield "handles", gallery.torus()
     yield "cut, and a fin", with_more(disk.V, disk.F, [[0, 0, 5]], [[*disk.F[2, :2], disk.n]])
     yield "cut twice as often", with_more(disk.V, disk.F, (), disk.F[:1])
     yield "crumpled", (hard_surface(3).V, hard_surface(3).F)
