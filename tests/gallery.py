@@ -10,7 +10,7 @@ from cembench import DiskMesh, HoledMesh
 
 def obj_text(V, F):
     lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in np.asarray(V, float).tolist()]
-    lines += ["f " + " ".join(str(k + 1) for k in face) for face in np.asarray(F).tolist()]
+    lines += ["f " + " ".join(str(int(k) + 1) for k in face) for face in F]
     return "\n".join(lines) + "\n"
 
 

@@ -5,14 +5,10 @@ from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 
 from cembench.surfaces.flat_disk import flat_disk
 
+from tests import gallery
 
-def _obj(mesh):
-    lines = [f"v {x!r} {y!r} {z!r}\n" for x, y, z in mesh.V.tolist()]
-    lines += ["f {} {} {}\n".format(*triangle) for triangle in (mesh.F + 1).tolist()]
-    return "".join(lines).encode()
-
-
-_DISK = _obj(flat_disk(200))
+_FLAT = flat_disk(200)
+_DISK = gallery.obj_text(_FLAT.V, _FLAT.F).encode()
 
 
 def content_of(name):

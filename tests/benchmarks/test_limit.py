@@ -35,10 +35,7 @@ def test_a_surface_is_a_cap_or_a_file_split_some_times(tmp_path):
 
     path = tmp_path / "flat.obj"
     V, F = gallery.flat_rectangle(2, 3)
-    path.write_text(
-        "".join(f"v {x} {y} {z}\n" for x, y, z in V)
-        + "".join(f"f {i} {j} {k}\n" for i, j, k in F + 1)
-    )
+    path.write_text(gallery.obj_text(V, F))
     assert read_surface(str(path)).m == read_mesh(path).m == len(F)
     assert read_surface(f"{path}@2").m == 16 * len(F)
     assert read_surface("500").m == pytest.approx(500, rel=0.3)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
@@ -50,6 +51,16 @@ def _ring(vertices: int) -> Real:
     return np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1)
 
 
+def _rings(k: int, rings: int = 1) -> Faces:
+    """Return the triangles of rings of k vertices around vertex 0."""
+    F = [[0, 1 + i, 1 + (i + 1) % k] for i in range(k)]
+    for a in range(1, (rings - 1) * k, k):
+        for i in range(k):
+            j, b = (i + 1) % k, a + k
+            F += [[a + i, b + i, b + j], [a + i, b + j, a + j]]
+    return np.array(F, np.int64)
+
+
 def _jittered(V: Real, rng: Random, size: float) -> Real:
     return V + size * rng.standard_normal(V.shape)
 
@@ -70,37 +81,14 @@ def _delaunay(points: Real, keep: Callable[[Real], NDArray[np.bool_]]) -> Arrays
 def _unpinched(F: Faces) -> Faces:
     """Return the largest piece in which no two parts touch in a point alone."""
     while True:
-        F = _largest_piece(F)
+        piece = igl.facet_components(F)[1]
+        F = F[piece == np.argmax(np.bincount(piece))]
         edges = {(f[k], f[(k + 1) % 3]) for f in F.tolist() for k in range(3)}
         starts = [a for a, b in edges if (b, a) not in edges]
         pinched = [a for a in set(starts) if starts.count(a) > 1]
         if not pinched:
             return F
         F = F[~np.isin(F, pinched[:1]).any(axis=1)]
-
-
-def _largest_piece(F: Faces) -> Faces:
-    """Return the largest set of triangles that hang together by edges."""
-    of_edge: dict[frozenset[int], list[int]] = {}
-    for t, face in enumerate(F.tolist()):
-        for k in range(3):
-            of_edge.setdefault(frozenset((face[k], face[k - 1])), []).append(t)
-    best: set[int] = set()
-    seen: set[int] = set()
-    for start in range(len(F)):
-        if start in seen:
-            continue
-        piece, front = {start}, [start]
-        while front:
-            face = F[front.pop()].tolist()
-            for k in range(3):
-                for t in of_edge[frozenset((face[k], face[k - 1]))]:
-                    if t not in piece:
-                        piece.add(t)
-                        front.append(t)
-        seen |= piece
-        best = max(best, piece, key=len)
-    return F[sorted(best)]
 
 
 def random_disk(rng: Random) -> Arrays:
@@ -185,14 +173,8 @@ def crowded_boundary(rng: Random) -> Arrays:
     angle = 2 * np.pi * (np.arange(k) / k) ** rng.uniform(1, 12)
     z = np.concatenate([r * np.exp(1j * angle) for r in (1 + np.arange(rings)) / rings])
     V = np.concatenate([[[0, 0, 0]], np.stack([z.real, z.imag, 0 * z.real], 1)])
-    F = [[0, 1 + i, 1 + (i + 1) % k] for i in range(k)]
-    for ring in range(rings - 1):
-        a, b = 1 + ring * k, 1 + (ring + 1) * k
-        for i in range(k):
-            j = (i + 1) % k
-            F += [[a + i, b + i, b + j], [a + i, b + j, a + j]]
     V[:, 2] = rng.uniform(0, 1) * (1 - np.abs(V[:, 0]))
-    return V, np.array(F, np.int64)
+    return V, _rings(k, rings)
 
 
 def spiral(rng: Random) -> Arrays:
@@ -246,7 +228,7 @@ def few_triangles(rng: Random) -> Arrays:
     else:
         k = count + 2
         V = np.concatenate([[[0, 0, rng.normal()]], _ring(k)])
-        F = np.array([[0, 1 + i, 1 + (i + 1) % k] for i in range(k)])
+        F = _rings(k)
     return V, F.astype(np.int64)
 
 
@@ -331,7 +313,7 @@ def high_valence(rng: Random) -> Arrays:
     k = int(rng.integers(50, 400))
     V = np.concatenate([[[0, 0, rng.uniform(0, 20)]], _ring(k)])
     V[1:] *= rng.uniform(0.5, 2, (k, 1))
-    return V, np.array([[0, 1 + i, 1 + (i + 1) % k] for i in range(k)], np.int64)
+    return V, _rings(k)
 
 
 def noise(rng: Random) -> Arrays:
@@ -355,13 +337,7 @@ def deep_bowl(rng: Random) -> Arrays:
     V = [[0.0, 0.0, 1.0]] + [
         [np.sin(p) * np.cos(a), np.sin(p) * np.sin(a), np.cos(p)] for p in polar for a in angle
     ]
-    F = [[0, 1 + i, 1 + (i + 1) % k] for i in range(k)]
-    for ring in range(rings - 1):
-        a, b = 1 + ring * k, 1 + (ring + 1) * k
-        for i in range(k):
-            j = (i + 1) % k
-            F += [[a + i, b + i, b + j], [a + i, b + j, a + j]]
-    return np.array(V), np.array(F, np.int64)
+    return np.array(V), _rings(k, rings)
 
 
 FAMILIES: dict[str, Callable[[Random], Arrays]] = {

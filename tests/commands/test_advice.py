@@ -19,17 +19,10 @@ from tests.mesh.test_repair_cuts import defective
 BY_HAND = ("divide all coordinates by", "export or download it again")
 
 
-def write_raw(path, V, F):
-    """Write arrays as they are, which `write_mesh` refuses."""
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in V.tolist()]
-    lines += [f"f {a} {b} {c}" for a, b, c in (F + 1).tolist()]
-    path.write_text("\n".join(lines) + "\n")
-
-
 @pytest.mark.parametrize("verb", ["map", "cut"])
 @pytest.mark.parametrize(("V", "F"), [case[1] for case in defective()], ids=dict(defective()))
 def test_the_commands_that_an_error_names_end_in_a_map(cli, verb, V, F):
-    write_raw(cli.folder / "mine.obj", V, F)
+    (cli.folder / "mine.obj").write_text(gallery.obj_text(V, F))
     file, seen = "mine.obj", []
     while True:
         code, _, err = cli(verb, file, *(("-o", "disk.obj") if verb == "cut" else ()))
@@ -54,7 +47,7 @@ def test_the_commands_that_an_error_names_end_in_a_map(cli, verb, V, F):
 @pytest.mark.parametrize("surface", [gallery.flat_rectangle(4, 5), gallery.octahedron()])
 def test_the_options_that_an_error_names_end_in_a_map_too(cli, surface):
     """Those of `map`, and the other kind of algorithm."""
-    write_raw(cli.folder / "mine.obj", *surface)
+    (cli.folder / "mine.obj").write_text(gallery.obj_text(*surface))
     call, advised = ["map", "mine.obj", "-a", "direct-cem-holes"], []
     while True:
         code, _, err = cli(*call)
@@ -70,7 +63,7 @@ def test_the_options_that_an_error_names_end_in_a_map_too(cli, surface):
 
 def test_a_hole_is_filled_or_kept_as_the_error_says(cli):
     V, F = next(case for name, case in defective() if name == "holes")
-    write_raw(cli.folder / "mine.obj", V, F)
+    (cli.folder / "mine.obj").write_text(gallery.obj_text(V, F))
     code, _, err = cli("map", "mine.obj", "-a", "cem")
     assert code == 2
     assert "`cembench repair mine.obj -o mine_repaired.obj --fill-holes 6`" in " ".join(err.split())
@@ -221,7 +214,9 @@ def files(cli):
     for name in (DISK, OTHER, f"folder/{DISK}"):
         flat = TriangleMesh.from_arrays(V, F)
         write_mesh(cli.folder / name, flat, V[:, 0] + 1j * V[:, 1])  # with UVs to bake from
-    write_raw(cli.folder / TWO, np.vstack([V, V + 9]), np.vstack([F, F + len(V)]))
+    (cli.folder / TWO).write_text(
+        gallery.obj_text(np.vstack([V, V + 9]), np.vstack([F, F + len(V)]))
+    )
     (cli.folder / "taken").touch()
     imsave(cli.folder / "texture.png", np.zeros((8, 8, 3)))
 

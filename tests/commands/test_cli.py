@@ -5,8 +5,12 @@ import subprocess
 import sys
 
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench.linear_algebra.backends import available_backends
+from cembench.mesh.files import write_mesh
 from cembench.registry import load_registry
 from tests import gallery
 from tests.real_meshes import DISKS, real_mesh
@@ -15,10 +19,6 @@ from tests.running.test_local import FAULTY
 
 @pytest.fixture
 def cap(tmp_path):
-    from cembench.surfaces.spherical_cap import spherical_cap
-
-    from cembench.mesh.files import write_mesh
-
     write_mesh(tmp_path / "cap.obj", spherical_cap(600))
     return tmp_path / "cap.obj"
 
@@ -56,8 +56,6 @@ def test_map_writes_uvs_and_a_picture(cli, cap):
 
 
 def test_map_takes_the_algorithm_that_fits_the_surface(cli, cap, tmp_path):
-    from cembench.mesh.files import write_mesh
-
     write_mesh(tmp_path / "holes.obj", gallery.three_holes())
     taken = [
         json.loads(cli("map", file, "--json")[1])["algorithm"]
@@ -84,36 +82,23 @@ def test_an_invalid_map_is_written_on_request_and_called_invalid(cli, cap):
     assert json.loads(cli(*arguments, "--keep-invalid", "--json")[1])["status"] == "invalid"
 
 
-def test_map_tells_of_a_map_that_is_far_from_conformal(cli, tmp_path):
-    from cembench.surfaces.flat_disk import flat_disk
-
-    from cembench.mesh.files import write_mesh
-
-    write_mesh(tmp_path / "long.obj", flat_disk(600, stretch=4.0))
-    code, out, _ = cli("map", tmp_path / "long.obj", "-a", "harmonic-circle", "--json")
+@pytest.mark.parametrize(
+    ("mesh", "algorithm", "told", "instead"),
+    [
+        (flat_disk(600, stretch=4.0), "harmonic-circle", "far from conformal", ()),
+        (hemi_ellipsoid(6400), "cem", "-p cem.stop=change", ("-a", "cem", "-p", "cem.stop=change")),
+    ],
+)
+def test_map_tells_of_a_much_better_map(cli, tmp_path, mesh, algorithm, told, instead):
+    write_mesh(tmp_path / "a.obj", mesh)
+    code, out, _ = cli("map", tmp_path / "a.obj", "-a", algorithm, "--json")
     assert code == 0
     (note,) = json.loads(out)["notes"]
-    assert "far from conformal" in note
-    assert json.loads(cli("map", tmp_path / "long.obj", "--json")[1])["notes"] == []
-
-
-def test_map_names_a_much_better_stop(cli, tmp_path):
-    from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
-
-    from cembench.mesh.files import write_mesh
-
-    write_mesh(tmp_path / "half.obj", hemi_ellipsoid(6400))
-    code, out, _ = cli("map", tmp_path / "half.obj", "-a", "cem", "--json")
-    assert code == 0
-    (note,) = json.loads(out)["notes"]
-    assert "-p cem.stop=change" in note
-    named = ("-p", "cem.stop=change", "--json")
-    assert json.loads(cli("map", tmp_path / "half.obj", "-a", "cem", *named)[1])["notes"] == []
+    assert told in note
+    assert json.loads(cli("map", tmp_path / "a.obj", *instead, "--json")[1])["notes"] == []
 
 
 def test_without_repair_a_folded_map_is_invalid_and_its_folds_are_a_figure(cli, tmp_path):
-    from cembench.mesh.files import write_mesh
-
     write_mesh(tmp_path / "crumpled.obj", gallery.crumpled_disk())
     arguments = ("map", tmp_path / "crumpled.obj", "-a", "harmonic-circle")
     code, out, _ = cli(*arguments, "-p", "repair=false", "--json")
@@ -127,23 +112,10 @@ def test_without_repair_a_folded_map_is_invalid_and_its_folds_are_a_figure(cli, 
 
 
 def test_run_records_shows_and_resumes(cli, cap):
-    arguments = [
-        "run",
-        "--mesh",
-        cap,
-        "--surfaces",
-        "flat-disk",
-        "--faces",
-        600,
-        "-a",
-        "cem,lscm",
-        "-p",
-        "cem.max_iterations=1",
-        "--repeats",
-        2,
-        "-o",
-        "here",
-    ]
+    arguments = (
+        *("run", "--mesh", cap, "--surfaces", "flat-disk", "--faces", 600, "-a", "cem,lscm"),
+        *("-p", "cem.max_iterations=1", "--repeats", 2, "-o", "here"),
+    )
     code, out, err = cli(*arguments)
     assert code == 0
     assert "Records and maps:" in out

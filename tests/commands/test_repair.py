@@ -21,7 +21,7 @@ from tests.real_meshes import real_mesh
 def bad_file(tmp_path):
     path = tmp_path / "bad.obj"
     draft = broken.broken(broken.open_seam, broken.fin, broken.isolated, broken.ear)
-    path.write_text(broken.obj_text(draft))
+    path.write_text(gallery.obj_text(draft.points, draft.faces))
     return path
 
 

@@ -145,9 +145,3 @@ def broken(*defects):
     for defect in defects:
         defect(draft)
     return draft
-
-
-def obj_text(draft):
-    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in draft.points]
-    lines += ["f " + " ".join(str(v + 1) for v in face) for face in draft.faces]
-    return "\n".join(lines) + "\n"

@@ -7,7 +7,8 @@ from cembench import DiskMesh, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.mesh.files import read_mesh, read_soup, repaired_soup
-from tests.mesh.broken import ALONE_AND_IN_PAIRS, DEFECTS, broken, obj_text, turned
+from tests import gallery
+from tests.mesh.broken import ALONE_AND_IN_PAIRS, DEFECTS, broken, turned
 
 
 @pytest.mark.parametrize(
@@ -15,7 +16,8 @@ from tests.mesh.broken import ALONE_AND_IN_PAIRS, DEFECTS, broken, obj_text, tur
 )
 def test_refused_with_all_causes_then_mended_then_mapped(defects, tmp_path):
     path = tmp_path / "broken.obj"
-    path.write_text(obj_text(broken(*defects)))
+    draft = broken(*defects)
+    path.write_text(gallery.obj_text(draft.points, draft.faces))
     expected = set().union(*(DEFECTS[d] for d in defects))
     if expected:
         with pytest.raises(UnusableMeshError) as refused:
@@ -41,7 +43,7 @@ def test_refused_with_all_causes_then_mended_then_mapped(defects, tmp_path):
 
 def test_the_whole_surface_is_left_alone(tmp_path):
     draft = broken()
-    (tmp_path / "whole.obj").write_text(obj_text(draft))
+    (tmp_path / "whole.obj").write_text(gallery.obj_text(draft.points, draft.faces))
     repaired = repaired_soup(read_soup(tmp_path / "whole.obj"))[1]
     assert not any(repaired.steps.values())
     V, F = repaired.surfaces[0]
