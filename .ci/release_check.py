@@ -26,6 +26,8 @@ ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 #: Bytes that they may have at most.
 WHEEL_BYTES, SDIST_BYTES = 2_000_000, 3_000_000
+#: What the default installation may weigh, in bytes on disk, and how many packages it may be.
+BYTES, PACKAGES = 600e6, 37
 #: What must not be published.
 FOREIGN = (".pyc", ".npz", ".obj", ".ply", ".so", ".orig", ".rej")
 #: Tests of the installed package: what needs no file of the repository but these.
@@ -43,6 +45,29 @@ TESTS = (
 #: The extras that they need.
 EXTRAS = "fetch,parquet,report,standins,tables"
 NEEDED = ("pytest", "hypothesis", "PyYAML", "selenium", "trimesh")
+#: The two lines of README, on everything they take, by the default installation.
+NOTEBOOK = """
+import cembench
+
+disk, ring = cembench.surface("hemi-ellipsoid", 400), cembench.surface("catenoid-ring", 400)
+for mesh, algorithm in ((disk, "direct-cem"), (ring, "direct-cem-holes")):
+    cembench.write_mesh(f"{mesh.name}.off", mesh)
+    for surface in (mesh, (mesh.V, mesh.F), f"{mesh.name}.off"):
+        result = cembench.parameterize(surface)
+        assert result.ok and result.algorithm.name == algorithm
+        assert "data:image/png;base64," in result._repr_html_()
+        assert result.plot().get_size_inches()[0] > 5
+        assert result.show(f"{mesh.name}.html").stat().st_size > 10_000
+        result.save(f"{mesh.name}.obj", overwrite=True)
+run = cembench.benchmark([disk], ["lscm"], rounds=1)
+assert "lscm" in run._repr_html_()
+assert len(run.table()) == 1
+try:
+    run.report()
+except cembench.MissingExtra as missing:
+    print(missing.extra)
+print(cembench.__file__)
+"""
 
 
 def main() -> None:
@@ -153,17 +178,23 @@ def try_out(wheel: Path, folder: Path) -> bool:
     away.mkdir()
     shutil.copytree(ROOT / "tests", away / "tests", ignore=shutil.ignore_patterns("__pycache__"))
     shutil.copy(ROOT / "pyproject.toml", away)  # the settings of pytest
-    install = (uv.find_uv_bin(), "pip", "install", "--quiet", "--python", str(python))
+    pip = (uv.find_uv_bin(), "pip")
+    install = (*pip, "install", "--quiet", "--python", str(python))
     run(uv.find_uv_bin(), "venv", "--quiet", "--python", sys.executable, str(environment))
-    run(*install, str(wheel))
+    run(*install, "--link-mode", "copy", "--compile-bytecode", str(wheel))
+    packages = run(*pip, "list", "--python", str(python), "--format", "freeze").split()
+    size = sum(path.lstat().st_blocks * 512 for path in environment.rglob("*"))
+    missing, place = run(str(python), "-c", NOTEBOOK, cwd=away).split()
+    if len(packages) > PACKAGES or size > BYTES or missing != "report":
+        print(f"wrong: {len(packages)} packages of {size:,} bytes; {missing} is missing")
+        return False
+    if not Path(place).is_relative_to(environment):
+        print(f"wrong: the package that was tried is {place}")
+        return False
     cembench = python.with_name("cembench")
     run(str(cembench), "--version", cwd=away)
     run(str(cembench), "list", "algorithms", cwd=away)
     run(*install, f"{wheel}[{EXTRAS}]", *NEEDED)
-    place = run(str(python), "-c", "import cembench; print(cembench.__file__)", cwd=away)
-    if not Path(place.strip()).is_relative_to(environment):
-        print(f"wrong: the package that was tried is {place.strip()}")
-        return False
     command = (str(python), "-m", "pytest", "-q", "-m", "not slow", "-o", "addopts=", *TESTS)
     return subprocess.run(command, cwd=away, env=clean(), check=False).returncode == 0
 

@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import re
+import sys
 import tomllib
 from pathlib import Path
 
@@ -43,8 +44,20 @@ def test_another_version_would_be_found(check, tmp_path, monkeypatch):
     assert "begins with '## 0.0.1'" in heading
 
 
-def test_the_tests_of_the_installed_package_are_there(check):
-    assert [name for name in check.TESTS if not (ROOT / name).is_file()] == []
+def test_the_tests_of_installed_packages_are_there(check):
+    named = (*check.TESTS, *ci("test_matrix").SUBSET)
+    assert [name for name in named if not (ROOT / name).is_file()] == []
+
+
+@pytest.mark.slow
+def test_the_default_installation_is_light_and_does_what_readme_says(check, tmp_path):
+    wheel, _ = check.build(tmp_path)
+    assert check.try_out(wheel, tmp_path)
+
+
+@pytest.mark.slow
+def test_the_lowest_versions_declared_pass_the_tests():
+    assert ci("test_matrix").tests(sys.executable, lowest=True, whole=False)
 
 
 def test_the_matrix_names_the_versions_that_are_declared():

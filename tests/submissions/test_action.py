@@ -2,15 +2,16 @@
 
 import shutil
 import sys
+from pathlib import Path
 from xml.etree import ElementTree as Xml
 
 import pytest
 import yaml
 from markdown_it import MarkdownIt
 
-from tests.source_copy import ROOT
 from tests.submissions.workflow_steps import run_step, steps_of
 
+ROOT = Path(__file__).parents[2]
 ACTION = ROOT / "action.yml"
 EXAMPLE = ROOT / "examples/solver_repository"
 WORKFLOW = EXAMPLE / ".github/workflows/validate.yml"

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import zipfile
+from pathlib import Path
 
 import pytest
 
@@ -17,9 +18,9 @@ from cembench.results.records import signed
 from cembench.results.signing import signer
 from tests.browser import open_browser
 from tests.results.simulated_machines import SECONDS, SURFACES, machine_run
-from tests.source_copy import ROOT
 from tests.submissions.workflow_steps import run_step, steps_of
 
+ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/results_repository"
 WORKFLOW = EXAMPLE / ".github/workflows/results.yml"
 
