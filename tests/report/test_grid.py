@@ -1,21 +1,17 @@
 """A table on a terminal: what is broken into lines, left out or shortened, and what is marked."""
 
-import io
 from pathlib import Path
-
-from rich.console import Console
 
 from cembench.report.document import Column, Section, Table, Text, Value, words
 from cembench.report.render.terminal import folded
+from tests.terminal import printed
 
 ROOT = Path(__file__).parents[2]
 NAME = Column("surface", numeric=False)
 
 
 def shown(item, width=40):
-    console = Console(width=width, record=True, file=io.StringIO())
-    console.print(item)
-    return [line.rstrip() for line in console.export_text().splitlines()]
+    return [line.rstrip() for line in printed(item, width).splitlines()]
 
 
 def test_names_are_shortened_and_figures_stand_right():

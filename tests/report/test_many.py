@@ -1,6 +1,5 @@
 """The report of a run over many surfaces: shares, profiles, wins, the hardest, and no page each."""
 
-import io
 import re
 
 import numpy as np
@@ -24,6 +23,7 @@ from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
 from tests.records import changed
 from tests.report.small_run import ok, record
+from tests.terminal import printed
 
 #: `direct-cem` is the best and slowest, `harmonic-circle` the fastest; both map all surfaces.
 SECONDS = {"cem": 0.5, "direct-cem": 1.0, "harmonic-circle": 0.1, "lscm": 0.4}
@@ -263,11 +263,7 @@ def test_every_sentence_says_on_how_many_families_it_rests(of_families):
 
 
 def test_the_terminal_has_a_line_an_algorithm(evidence):
-    from rich.console import Console
-
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(many_table(evidence))
-    text = console.export_text()
+    text = printed(many_table(evidence))
     assert all(len(line.rstrip()) <= 80 for line in text.splitlines())
     line = next(line for line in text.splitlines() if line.startswith("cem"))
     assert line.split()[1:4] == ["26", "23", "88.5%"]

@@ -1,11 +1,9 @@
 import hashlib
-import io
 import json
 import re
 from dataclasses import replace
 
 import pytest
-from rich.console import Console
 
 from cembench.core.errors import RecordError
 from cembench.report import plots
@@ -29,6 +27,7 @@ from tests.limits import tree
 from tests.records import changed
 from tests.report.sample_report import CITATION
 from tests.report.small_run import meshes, write_run
+from tests.terminal import printed
 
 
 def test_everything_that_the_report_names_is_there(written):
@@ -125,10 +124,8 @@ def test_the_first_screen_of_every_form_has_the_paper_and_all_verdicts(written):
     assert counted.startswith(f"Of {len(claims)} claims of the paper, ")
     assert sum(numbers) == len(claims)
     assert report.findings.table is None
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(paper_tables(report))
     forms = [(folder / name).read_text() for name in ("index.html", "report.md", "report.tex")]
-    for text in (console.export_text(), *forms):
+    for text in (printed(paper_tables(report)), *forms):
         head = " ".join(text.split())
         assert CITATION.authors in head
         assert f"doi:{CITATION.doi}" in head
@@ -139,9 +136,7 @@ def test_the_first_screen_of_every_form_has_the_paper_and_all_verdicts(written):
 
 
 def test_the_terminal_shows_four_tables_in_80_columns(written):
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(paper_tables(written[0]))
-    text = console.export_text()
+    text = printed(paper_tables(written[0]))
     assert all(f"Table {k}: " in text for k in (1, 2, 3, 4))
     assert max(map(len, text.splitlines())) <= 80
     assert "1.00ˢ" in text
@@ -203,9 +198,7 @@ def test_a_run_of_other_surfaces_alone_has_a_report(tmp_path):
     tables = list(items_of(report, Table))
     assert not any(column.title == "printed" for table in tables for column in table.columns)
     assert "cells ended with a valid map" in report.findings.figures[-1].words
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(paper_tables(report))
-    text = console.export_text()
+    text = printed(paper_tables(report))
     assert max(map(len, text.splitlines())) <= 80
     assert any(line.split()[:2] == ["flat-disk", "QIEM"] for line in text.splitlines())
     assert re.search(r"^ +FDM +timeout +timeout +timeout +timeout", text, re.M)

@@ -1,24 +1,9 @@
-from io import StringIO
-
-from rich.console import Console
-
 from cembench.report.content.evidence import Evidence
 from cembench.report.run_tables import results_table, speedups_table
 from cembench.results.records import Neighbours
 from cembench.results.store import Store
 from tests.records import changed, record_of
-
-
-def printed(records):
-    console = Console(width=80, record=True, file=StringIO())
-    console.print(speedups_table(records, "cem"))
-    return console.export_text()
-
-
-def shown(table):
-    console = Console(width=80, record=True, file=StringIO())
-    console.print(table)
-    return console.export_text()
+from tests.terminal import printed
 
 
 def records_of(rounds, *algorithms):
@@ -30,7 +15,7 @@ def records_of(rounds, *algorithms):
 
 
 def test_with_too_few_rounds_a_surface_has_a_line_and_the_doubt_is_said_once():
-    text = printed(records_of(1, ("fdm", 3.0), ("lscm", 0.5)))
+    text = printed(speedups_table(records_of(1, ("fdm", 3.0), ("lscm", 0.5)), "cem"))
     assert text.count("There are no intervals") == 1
     assert "too few" not in text
     lines = [line.split() for line in text.splitlines()]
@@ -40,7 +25,7 @@ def test_with_too_few_rounds_a_surface_has_a_line_and_the_doubt_is_said_once():
 
 
 def test_with_enough_rounds_every_comparison_has_its_interval_and_verdict():
-    text = printed(records_of(6, ("fdm", 3.0)))
+    text = printed(speedups_table(records_of(6, ("fdm", 3.0)), "cem"))
     assert "2.00 to 2.00" in text
     assert text.count("slower") == 2
     assert "How sure" not in text
@@ -57,16 +42,16 @@ def test_verdicts_of_a_table_hold_together_and_what_that_costs_is_said():
         for mesh in ("hat", "foot")
         for name, times in (("cem", [1.0] * 6), ("fdm", near))
     ]
-    text = " ".join(printed(cells).split())
+    text = " ".join(printed(speedups_table(cells, "cem")).split())
     assert text.count("undecided") == 2
     assert "(Holm, 2 comparisons)" in text
     assert "Taken alone, 2 more would be called different" in text
-    assert "Holm" not in printed(cells[:2])
+    assert "Holm" not in printed(speedups_table(cells[:2], "cem"))
 
 
 def test_a_busy_machine_is_told_once(tmp_path):
     def results_of(record):
-        return shown(results_table(Evidence(Store(tmp_path), (record,), ())))
+        return printed(results_table(Evidence(Store(tmp_path), (record,), ())))
 
     record = record_of([1.0] * 6)
     beside = [Neighbours(other_cores=one) for one in (1.0, 1.0, 0.0, 0.0, 0.0, 0.0)]

@@ -1,10 +1,7 @@
 """Seconds of several machines are marked, and cells of several machines are kept apart."""
 
-import io
-
 import numpy as np
 import pytest
-from rich.console import Console
 
 from cembench.commands.cli import app
 from cembench.report.content.evidence import Evidence
@@ -17,6 +14,7 @@ from cembench.results.merging import merge, others_of
 from cembench.results.store import Store
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from tests.records import changed, record_of
+from tests.terminal import printed
 
 
 def cell_of(algorithm, mesh, environment, seconds=1.0, started="2026-01-01", status="ok"):
@@ -85,12 +83,6 @@ def test_merging_again_changes_nothing_and_a_new_leader_takes_the_place(two_mach
     assert others["node-2"].records() == []
     assert result.cells == 4
     assert all(c.machines == ("node-2", "node-1") for c in result.conflicts)
-
-
-def printed(renderable):
-    console = Console(width=80, record=True, file=io.StringIO())
-    console.print(renderable)
-    return console.export_text()
 
 
 def test_tables_of_several_machines_mark_seconds_and_say_so(two_machines, tmp_path):

@@ -1,12 +1,10 @@
-from io import StringIO
-
 import pytest
-from rich.console import Console
 
 from cembench.validation.document import validation_text
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
+from tests.terminal import printed
 
 
 def finding(name, measured, ok):
@@ -69,11 +67,8 @@ def test_equal_and_undecided():
 
 @pytest.mark.parametrize("speed", [None, (0.55, 0.53, 0.58, "faster")])
 def test_beside_a_speed_stands_what_is_not_detected(speed):
-    shown = StringIO()
-    Console(file=shown, width=80).print(
-        validation_text(validation(against=(against(speed=speed),)))
-    )
-    assert ("written to deceive" in shown.getvalue()) == (speed is not None)
+    shown = printed(validation_text(validation(against=(against(speed=speed),))))
+    assert ("written to deceive" in shown) == (speed is not None)
 
 
 def test_several_baselines_are_named():
