@@ -1,5 +1,6 @@
 """Records that nobody measured: what a test says of one, beside what is usual."""
 
+from cembench.registry import load_registry
 from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
 
 FACTS = MeshFacts(vertices=3, faces=1, boundary_vertices=3, non_delaunay_share=0)
@@ -19,6 +20,17 @@ def record_of(seconds=(), sittings=None, **cell):
         environment="e",
         started_at="",
     )
+
+
+def record_on(surface, algorithm, outcome, **cell):
+    """A record of an algorithm, registered or not, on a surface."""
+    known = load_registry().algorithms.get(algorithm)
+    about = {"title": known.title, "target": known.target} if known else {}
+    cell = {"algorithm": algorithm, "mesh": surface.name, "mesh_hash": surface.hash} | cell
+    loop = len(surface.loops[0])
+    facts = {"vertices": surface.n, "faces": surface.m, "boundary_vertices": loop}
+    about |= {"outcome": outcome, "started_at": "2026-01-01T00:00:00+00:00"}
+    return changed(record_of(**cell), mesh=facts, **about)
 
 
 def changed(record, each=None, **fields):

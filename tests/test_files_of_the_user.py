@@ -19,9 +19,10 @@ from cembench.mesh.files import read_mesh, write_mesh
 from cembench.report import plots
 from cembench.report.content import inspection
 from cembench.results.merging import merge
-from cembench.results.records import Cell, MeshFacts, Outcome, Record
+from cembench.results.records import Outcome
 from cembench.results.store import Store
 from tests.limits import files_of_at_most, tree
+from tests.records import record_on
 
 pytestmark = pytest.mark.usefixtures("one_server")
 
@@ -82,14 +83,9 @@ def run(cli):
     return a_run(cli.folder / "run")
 
 
-def a_run(folder, mesh=None, algorithm="harmonic-circle", **changes):
-    mesh = mesh or flat_disk(60)
-    cell = Cell(algorithm=algorithm, code_hash="c", mesh=mesh.name, mesh_hash=mesh.hash)
-    facts = MeshFacts(vertices=mesh.n, faces=mesh.m, boundary_vertices=9, non_delaunay_share=0)
-    record = Record(
-        cell=cell, title="Harmonic", target="disk", mesh=facts, environment="e",
-        outcome=Outcome(status="failed", cause="it did"), started_at="2026-01-01T00:00:00",
-    ).model_copy(update=changes)  # fmt: skip
+def a_run(folder, mesh=None, algorithm="harmonic-circle"):
+    failed = Outcome(status="failed", cause="it did")
+    record = record_on(mesh or flat_disk(60), algorithm, failed)
     Store(folder).save(record, None, {"id": "e"})
     return folder
 

@@ -7,8 +7,9 @@ import numpy as np
 import cembench
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from cembench.results.records import Cell, MeshFacts, Outcome, Record, Round
+from cembench.results.records import Outcome, Round
 from cembench.results.store import Store
+from tests.records import changed, record_on
 
 #: Seconds of each algorithm on a machine of usual speed, for a surface of 300 faces.
 SECONDS = {"cem": 0.010, "direct-cem": 0.008, "fdm": 0.030, "ldm": 0.012, "harmonic-circle": 0.004}
@@ -33,23 +34,13 @@ def record_of(surface, algorithm, number, speed, name, **round_):
     about = {"calls": (seconds,), "kernel_seconds": KERNEL / speed, "sitting": f"s{number}"}
     one = Round(**(about | round_))
     failed = number % 5 == 4 and algorithm == "fdm" and surface == "flat-disk"
-    return Record(
-        cell=Cell(algorithm=algorithm, code_hash="c", mesh=name, mesh_hash=mesh.hash),
-        title=load_registry().algorithm(algorithm).title,
-        target="disk",
-        mesh=MeshFacts(
-            vertices=mesh.n,
-            faces=mesh.m,
-            boundary_vertices=len(mesh.boundary),
-            non_delaunay_share=0.0,
-            family=surface if name == surface else "",
-        ),
-        outcome=Outcome(status="failed", cause="it gave up")
-        if failed
-        else Outcome(status="ok", rounds=(one,) * 6, metrics=metrics),
-        environment=f"e{number}",
-        started_at=f"2026-0{1 + number % 9}-01T00:00:00+00:00",
-    )
+    outcome = Outcome(status="failed", cause="it gave up")
+    if not failed:
+        outcome = Outcome(status="ok", rounds=(one,) * 6, metrics=metrics)
+    started = f"2026-0{1 + number % 9}-01T00:00:00+00:00"
+    made = record_on(mesh, algorithm, outcome, mesh=name)
+    family = {"family": surface} if name == surface else {}
+    return changed(made, environment=f"e{number}", started_at=started, mesh=family)
 
 
 def machine_run(folder, number, mesh="flat-disk", **round_):

@@ -9,6 +9,7 @@ from cembench.core.errors import ParameterError, RecordError
 from cembench.results.records import signed
 from cembench.results.signing import sign, signer
 from cembench.results.store import Store, read_record
+from tests.records import changed
 from tests.report.small_run import write_koebe, write_run
 
 pytestmark = pytest.mark.skipif(
@@ -52,9 +53,8 @@ def test_seconds_that_were_edited_with_a_new_digest_are_noticed(run, keys):
     sign(run, ada)
     path = Store(run).record_files()[0]
     record = read_record(path)
-    round_ = record.outcome.rounds[0].model_copy(update={"calls": (1e-6,)})
-    outcome = record.outcome.model_copy(update={"rounds": (round_, *record.outcome.rounds[1:])})
-    path.write_bytes(signed(record.model_copy(update={"outcome": outcome})))
+    calls = [(1e-6,), *(one.calls for one in record.outcome.rounds[1:])]
+    path.write_bytes(signed(changed(record, {"calls": calls})))
     assert Store(run).find(record.cell) is not None, "its digest is right"
     with pytest.raises(RecordError, match=r"was changed after ada@example\.org signed it"):
         signer(run, signers)

@@ -18,6 +18,7 @@ from cembench.running.pairing import PROCESSES, Scatter
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.timing import CellTimer
 from cembench.running.watcher import Watcher
+from tests.records import changed
 from tests.running.test_cheats import CHEATS, surface  # noqa: F401 - a fixture
 from tests.running.test_schedule import Invented, cells
 
@@ -200,9 +201,7 @@ def test_who_slows_its_neighbours_is_not_faster(surface, tmp_path):  # noqa: F81
 
 def apart(record):
     """The record without its calls in shared processes."""
-    rounds = [one.model_copy(update={"together": ()}) for one in record.outcome.rounds]
-    outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
-    return record.model_copy(update={"outcome": outcome})
+    return changed(record, {"together": [()] * len(record.outcome.rounds)})
 
 
 @pytest.mark.parametrize(

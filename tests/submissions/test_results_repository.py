@@ -17,6 +17,7 @@ from cembench.results import bundle
 from cembench.results.records import signed
 from cembench.results.signing import signer
 from tests.browser import open_browser
+from tests.records import changed
 from tests.results.simulated_machines import SECONDS, SURFACES, machine_run
 from tests.submissions.workflow_steps import run_step, steps_of
 
@@ -59,12 +60,10 @@ def edit(**changes):
         name = min(name for name in files if name.startswith("records/"))
         record = bundle.Record.model_validate_json(files[name])
         if "calls" in changes:
-            round_ = record.outcome.rounds[0].model_copy(update={"calls": changes["calls"]})
-            outcome = record.outcome.model_copy(update={"rounds": (round_,)})
-            files[name] = signed(record.model_copy(update={"outcome": outcome}))
+            record = changed(record, outcome={"rounds": record.outcome.rounds[:1]})
+            files[name] = signed(changed(record, {"calls": [changes["calls"]]}))
         elif "schema" in changes:
-            update = {"schema_version": changes["schema"]}
-            files[name] = signed(record.model_copy(update=update))
+            files[name] = signed(changed(record, schema_version=changes["schema"]))
         else:
             content = json.loads(files[name])
             content["outcome"]["metrics"]["angle_error_mean_deg"] = 0.1
@@ -223,8 +222,7 @@ def test_figures_that_are_not_of_the_maps_are_refused_with_right_digests(bundles
         name = min(name for name in files if name.startswith("records/"))
         record = bundle.Record.model_validate_json(files[name])
         metrics = record.outcome.metrics | {"angle_error_sd_deg": 0.5}
-        outcome = record.outcome.model_copy(update={"metrics": metrics})
-        files[name] = signed(record.model_copy(update={"outcome": outcome}))
+        files[name] = signed(changed(record, outcome={"metrics": metrics}))
 
     with_maps = rewritten(bundles / "node-2.zip", tmp_path / "a.zip", better)
     assert "the map gives different figures: angle_error_sd_deg" in refused(with_maps)

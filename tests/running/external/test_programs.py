@@ -22,6 +22,7 @@ from cembench.running.measure import check_cell
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.validation.quality import compare_speed
+from tests.records import changed
 
 SCRIPT = Path(__file__).with_name("misbehaves.py")
 pytestmark = pytest.mark.usefixtures("one_server")
@@ -140,8 +141,7 @@ def test_comparisons_take_the_solve_time_and_never_the_wall_clock():
     record, _ = map_once(program)
 
     def timed(*rounds):
-        outcome = record.outcome.model_copy(update={"rounds": rounds})
-        return record.model_copy(update={"outcome": outcome})
+        return changed(record, outcome={"rounds": rounds})
 
     ours = timed(*[Round(calls=(0.5,), start_seconds=0.3)] * 6)
     theirs = timed(*[Round(calls=(0.1,))] * 6).model_copy(update={"external": None})
