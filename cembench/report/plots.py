@@ -109,9 +109,9 @@ WIDTH, HEIGHT, DPI = 4.6, 3.3, 130
 DECADES = 300
 #: A logarithmic axis that spans less than this factor is labelled as a linear one is.
 SHORT = 5
-#: From here on, ticks of a logarithmic axis are written as powers of ten.
-LARGE = 10_000_000
-_RAISED = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: From here on, and below, ticks of a logarithmic axis are written as powers of ten.
+LARGE, SMALL = 10_000_000, 1e-5
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 #: Maximum number of ticks on an axis of integers.
 TICKS = 8
 #: Inches that a character of a legend's name takes, what is beside a name, and a line.
@@ -285,8 +285,8 @@ def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
 
 def _tick(value: float) -> str:
     """Return a readable label for a power of ten, or 2 or 5 times one."""
-    if value >= LARGE:
-        exponent = int(np.log10(value) + 1e-9)
+    if value >= LARGE or value < SMALL:
+        exponent = int(np.floor(np.log10(value) + 1e-9))
         factor = round(value / 10.0**exponent)
         times = f"{factor}\N{MULTIPLICATION SIGN}" if factor > 1 else ""
         return f"{times}10{str(exponent).translate(_RAISED)}"

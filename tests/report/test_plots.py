@@ -137,7 +137,10 @@ def test_iterations_have_whole_ticks():
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.005, "0.005"), (1000, "1,000"), (1e6, "1,000,000"), (1e7, "10⁷"), (2e8, "2\u00d710⁸")],
+    [
+        *[(0.005, "0.005"), (1000, "1,000"), (1e6, "1,000,000"), (1e7, "10⁷"), (2e8, "2\u00d710⁸")],
+        *[(1e-5, "0.00001"), (1e-6, "10⁻⁶"), (5e-10, "5\u00d710⁻¹⁰")],
+    ],
 )
 def test_ticks_are_written_so_that_they_do_not_run_into_each_other(value, text):
     assert plots._tick(value) == text

@@ -38,7 +38,7 @@ READINGS = (
     Footer(label="saving, 1 - 1/(1 + mean)", value="1 - 1 / (1 + mean(x))", form="percent"),
     Footer(label="mean of the savings", value="mean(1 - 1 / (1 + x))", form="percent"),
 )
-MEAN_RATE, GEOMETRIC_RATE = READINGS[:2]
+MEAN_RATE = READINGS[0]
 
 
 def printed_tables(evidence: Evidence, number: int) -> list[Table]:
