@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 4_980,
     "running": 7_310,
     "drawing": 1_500,
-    "report": 7_580,
+    "report": 7_620,
     "validation": 2_290,
     "morphing": 1_350,
     "api": 5_050,

@@ -116,7 +116,11 @@ class Result:
 
     @property
     def energy_history(self) -> tuple[float, ...]:
-        """E_C (Eq. 7) at the start and after each iteration."""
+        """The algorithm's energy at the start and after each iteration: E_C (Eq. 7) as a rule.
+
+        ``extras["energy_of"]`` names another. That of `direct-cem` is E_C by the weights of the
+        intrinsic Delaunay triangulation.
+        """
         return self.outcome.energy_history
 
     @property
