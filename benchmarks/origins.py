@@ -36,9 +36,11 @@ GROUPS = {
     "harness": ("cembench/running/", "cembench/results/"),
     "the study": ("benchmarks/",),
 }
-#: What a kept report's records depend on: what measures. Reports are written of them, at any time.
+#: What a kept report's records depend on: what measures.
 MEASURING = "cembench/api/benchmark.py"
-_WRITTEN_LATER = "statistics over surfaces"
+#: What computes nothing but what reports are written with, at any time: only studies that import it
+#: themselves depend on it.
+_OF_REPORTS = "statistics over surfaces"
 #: Of whose imports everything is meant that entry points name, or all that the package offers.
 _ALL = ("cembench/registry.py", "cembench/__init__.py")
 
@@ -81,11 +83,13 @@ def hashes(tree: Tree, start: str) -> dict[str, str]:
     if start not in tree:
         return {}
     texts: dict[str, list[str]] = {}
-    for file in sorted(_closure(tree, start)):
-        if file in _NO_FIGURES:
+    files = _closure(tree, start)
+    own = {f for file in files if file.startswith("benchmarks/") for f in _imports(tree, file)}
+    for file in sorted(files):
+        if file in _NO_FIGURES or (file.startswith(GROUPS[_OF_REPORTS]) and file not in own):
             continue
         group = next((g for g, places in GROUPS.items() if file.startswith(places)), None)
-        if group is not None and (start, group) != (MEASURING, _WRITTEN_LATER):
+        if group is not None:
             texts.setdefault(group, []).append(f"{file}\n{plain(tree[file])}")
     return {
         group: hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]

@@ -50,6 +50,20 @@ def test_what_reads_records_does_not_depend_on_algorithms():
     assert changed(started, TREE | {"cembench/results/records.py": "x = 1\n"}) == ["harness"]
 
 
+def test_statistics_of_reports_count_only_where_a_study_imports_them():
+    families = "cembench/results/families.py"
+    reader = "import cembench.results.families\n" + TREE["benchmarks/reader.py"]
+    tree = TREE | {families: "x = 1\n", "benchmarks/reader.py": reader}
+    tree |= {"cembench/results/records.py": "import cembench.results.families\n"}
+    tree |= {"benchmarks/study.py": "import cembench.results.records\n"}
+    for start, told in (
+        ("benchmarks/reader.py", ["statistics over surfaces"]),
+        ("benchmarks/study.py", []),
+    ):
+        then = {"start": start, "hashes": hashes(tree, start)}
+        assert changed(then, tree | {families: "x = 2\n"}) == told
+
+
 @pytest.mark.parametrize(
     ("one", "other", "same"),
     [
