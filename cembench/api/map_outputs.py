@@ -15,7 +15,7 @@ from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
-from cembench.core.overwriting import check_page, refuse_twice
+from cembench.core.overwriting import refuse_twice
 from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
@@ -78,10 +78,12 @@ def check_options(
             check_image_format(path)
         elif what == "remeshed":
             check_writable_format(path, with_uv=True)
-        else:
-            check_page(path)
-            if not path.parent.is_dir():
-                raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
+        elif path.suffix.lower() not in (".html", ".htm"):
+            raise ParameterError.about(
+                "{page}: {html} writes a web page; use the suffix .html.", page=path
+            )
+        elif not path.parent.is_dir():
+            raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:

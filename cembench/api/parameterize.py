@@ -21,7 +21,6 @@ from cembench.api.settings import Placement
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
-from cembench.core.overwriting import check_page
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
@@ -326,8 +325,8 @@ class Result:
         from cembench.api.view import map_page
         from cembench.report.render.view_page import write_view_page
 
-        if path is not None:
-            check_page(Path(path))
+        if path is not None and Path(path).suffix.lower() not in (".html", ".htm"):
+            raise ParameterError(f"{path} is no name of a web page; use the suffix .html.")
         page = map_page(self.mesh, self.z, self.outcome, self.algorithm.title)
         if path is not None:
             write_view_page(Path(path), page)

@@ -23,12 +23,6 @@ def refuse_inputs(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
             )
 
 
-def check_page(path: Path) -> None:
-    """Raise :class:`ParameterError` if a web page is to be written to a file of another kind."""
-    if path.suffix.lower() not in (".html", ".htm"):
-        raise ParameterError(f"{path} is no name of a web page; use the suffix .html.")
-
-
 def refuse_twice(outputs: Sequence[Path], what: str, remedy: str) -> None:
     """Raise :class:`ParameterError` if two of `what` have the same path; `remedy` says what to do.
 

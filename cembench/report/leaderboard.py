@@ -93,13 +93,14 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
     usual, named = _usual_parameters(entrants), _of_one_title(entrants)
     for number, entrant in enumerate(entrants):
         evidence = entrant.evidence
+        apart = _apart(evidence, usual, named)
         environments = evidence.store.environments()
         names = [name for name in (*_SHOWN, *_READ) if name in evidence.frame]
         frame = evidence.frame[names]
         records = [evidence.by_key[key] for key in frame["key"]]
         frame = frame.assign(
             run=entrant.name,
-            label=frame["label"].replace(_apart(entrant.evidence, usual, named)),
+            label=[apart.get(label, label) for label in frame["label"]],
             record=[f"{number:03d}{key}" for key in frame["key"]],
             machine=[machine_of_record(record, environments) for record in records],
             family=[

@@ -111,7 +111,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
 
 def _sure(one: Comparison) -> Value:
     """Return the interval of a speedup, or why there is none."""
-    again = "; `run --fresh` measures both again" * (one.verdict == "not side by side")
+    again = "" if one.verdict == FEW_ROUNDS else "; `run --fresh` measures both again"
     return _interval(one.speedup_interval, " to ", one.verdict + again)
 
 
