@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from math import isclose
 from pathlib import Path
 from typing import Any
 
 from benchmarks.kept_report import DIGITS
-from benchmarks.origins import FILE, hashes, origins, tree_at
+from benchmarks.origins import hashes, origins, tree_at, write
 from benchmarks.pages import ROOT, Section, Table
-from cembench.core.atomic import write_text
 from cembench.results.columns import rows
 from cembench.results.records import REFERENCE
 from cembench.results.report_records import read_rows, text_rows
@@ -20,7 +18,7 @@ from cembench.results.store import Store
 
 #: What a map is known by, and the smallest share of a kept report's cells that speaks for it.
 FIGURES, LEAST = ("conformal_energy", "angle_error_mean_deg", "flipped_triangles"), 0.1
-#: Digits of kept figures are rounded.
+#: Kept figures have few digits: they are the same if they differ by less than this share.
 SAME = 10.0 ** (2 - DIGITS)
 
 
@@ -69,8 +67,7 @@ def confirm(report: Path, run: Path, *, reference: str = REFERENCE, command: str
         "one_decides": sum(before != after for before, after in said),
     }
     marks = hashes(tree_at(commit), known[name]["start"])
-    renewed = known | {name: known[name] | {"hashes": marks, "confirmed": how}}
-    write_text(FILE, json.dumps(renewed, indent=1, sort_keys=True) + "\n")
+    write(known | {name: known[name] | {"hashes": marks, "confirmed": how}})
     layout = """
 | report | confirmed at | cells | same verdict | at most one decides |
 |---|---|---:|---:|---:|

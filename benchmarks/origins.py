@@ -220,8 +220,12 @@ def record(made: str, start: str, command: str, seconds: float | None, commit: s
         "start": start,
         "hashes": hashes(tree_at(commit) if commit else working_tree(), start),
     }
-    text = json.dumps(origins() | {made: about}, indent=1, sort_keys=True)
-    write_text(FILE, text + "\n")
+    write(origins() | {made: about})
+
+
+def write(known: Mapping[str, Any]) -> None:
+    """Write what is recorded, by what was made."""
+    write_text(FILE, json.dumps(known, indent=1, sort_keys=True) + "\n")
 
 
 def changed(about: Mapping[str, Any], now: Tree) -> list[str]:

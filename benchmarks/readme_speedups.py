@@ -6,7 +6,6 @@ import csv
 import json
 from collections import Counter
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -29,7 +28,7 @@ def averages(file: Path) -> dict[str, dict[str, str]]:
     return {row["reading"]: row for row in _rows(file)}
 
 
-def rates(report: Path, algorithm: str, policy: str) -> dict[str, dict[str, Any]]:
+def rates(report: Path, algorithm: str, policy: str) -> list[dict[str, str]]:
     """Return the records of an algorithm with its rates of speedup, for every model once.
 
     A model that was measured itself counts, and not its stand-in; of a method with several sets of
@@ -44,14 +43,14 @@ def rates(report: Path, algorithm: str, policy: str) -> dict[str, dict[str, Any]
     ]
     counts = Counter(row["parameters"] for row in own)
     own.sort(key=lambda row: (row["origin"] == "model", counts[row["parameters"]]))
-    return {row["paper_row"]: row for row in own}
+    return list({row["paper_row"]: row for row in own}.values())
 
 
 def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
     """Return the interval of an average in words; nothing where cells have too few rounds."""
     if not {PACKED, RECORDS} & {file.name for file in report.iterdir()}:
         return ""
-    rows = rates(report, algorithm, policy).values()
+    rows = rates(report, algorithm, policy)
     if not enough_rounds([len(json.loads(row["ratios"] or "[]")) for row in rows]):
         return ""
     ratios = [1 + float(row["speedup"]) for row in rows]

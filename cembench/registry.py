@@ -16,7 +16,6 @@ import importlib.util
 import inspect
 import json
 import os
-import shlex
 import sys
 import typing
 from collections import ChainMap
@@ -35,7 +34,14 @@ from pydantic import TypeAdapter, ValidationError
 from cembench.core.errors import ParameterError, RegistryError, describe_error
 from cembench.core.names import did_you_mean, unknown
 from cembench.core.parameterization import MapStep
-from cembench.core.program import Library, Program, checked_program, found_words, of_matlab_function
+from cembench.core.program import (
+    Library,
+    Program,
+    checked_program,
+    found_words,
+    of_matlab_function,
+    words_of,
+)
 from cembench.core.wording import Advice
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -371,7 +377,7 @@ _TAKES = {"circular holes": _of_holes, "atlas": _of_any}
 
 def _program_name(command: str) -> str:
     """Return a short name for a command: its program, or the script that an interpreter runs."""
-    parts = [Path(word) for word in shlex.split(command)]
+    parts = [Path(word) for word in words_of(command)]
     script = next((word for word in parts[1:] if word.suffix in (".py", ".m", ".sh", ".js")), None)
     return (script or next(iter(parts), Path("program"))).stem or "program"
 

@@ -29,8 +29,9 @@ def refuse_twice(outputs: Sequence[Path], what: str, remedy: str) -> None:
     >>> from pathlib import Path
     >>> refuse_twice([Path("a.obj"), Path("b.obj")], "surfaces", "Name two folders.")
     """
-    for output in outputs:
-        if outputs.count(output) > 1:
+    places = [output.resolve() for output in outputs]
+    for output, place in zip(outputs, places, strict=True):
+        if places.count(place) > 1:
             raise ParameterError(f"two {what} would be written to {output}. {remedy}")
 
 

@@ -209,10 +209,8 @@ def of_matlab_function(file: Path) -> dict[str, str]:
     }
 
 
-def found_words(command: str, folder: Path) -> tuple[str, ...]:
-    """Split a command into words and make files of `folder` absolute paths.
-
-    A program runs in a folder of its own, where relative paths would not resolve.
+def words_of(command: str) -> list[str]:
+    """Split a command into words.
 
     Raises
     ------
@@ -221,10 +219,18 @@ def found_words(command: str, folder: Path) -> tuple[str, ...]:
 
     """
     try:
-        arguments = shlex.split(command)
+        return shlex.split(command)
     except ValueError as error:
         raise RegistryError(f"the command {command!r} cannot be split: {error}.") from None
-    return tuple(_absolute(word, folder) for word in arguments)
+
+
+def found_words(command: str, folder: Path) -> tuple[str, ...]:
+    """Split a command into words and make files of `folder` absolute paths.
+
+    A program runs in a folder of its own, where relative paths would not resolve. Raises as
+    :func:`words_of`.
+    """
+    return tuple(_absolute(word, folder) for word in words_of(command))
 
 
 def _absolute(word: str, folder: Path) -> str:

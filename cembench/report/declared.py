@@ -227,23 +227,7 @@ def declared_table(
         What braces in title and caption stand for, besides ``{policy}``.
 
     """
-    try:
-        spec = declared or own_tables()[name]
-        return _over(evidence, spec, keys, surfaces, notes, called or name, policy, texts)
-    except ParameterError as error:
-        raise ParameterError(f"table {name!r}: {error}") from error
-
-
-def _over(
-    evidence: Evidence,
-    spec: DeclaredTable,
-    keys: Iterable[str] | None,
-    surfaces: Sequence[MeasuredSurface],
-    notes: Sequence[str],
-    name: str,
-    policy: str,
-    texts: Mapping[str, str],
-) -> Table | None:
+    spec = declared or own_tables()[name]
     held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]
     policy = policy or evidence.policies[0]
     chosen = evidence.frame["solves"].isin(held)
@@ -263,10 +247,10 @@ def _over(
     known |= {"reference": evidence.reference_label, **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
-        return _of_surfaces(evidence, spec, frame, surfaces, name, known, below)
+        return _of_surfaces(evidence, spec, frame, surfaces, called or name, known, below)
     columns, entries = zip(*_columns(evidence, spec, frame, known), strict=True)
     title, caption = filled(spec.title, known), filled(spec.caption, known)
-    return Table(name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
+    return Table(called or name, title, columns, tuple(zip(*entries, strict=True)), caption, below)
 
 
 def _of_surfaces(

@@ -171,7 +171,10 @@ def further(
             called, of_plot = f"declared-{number}-{slug(name)}", isinstance(one, DeclaredPlot)
             make: Any = declared_plot if of_plot else declared_table
             gap = f"{one.title}: no record of this run is in this {'plot' if of_plot else 'table'}."
-            items.append(make(evidence, name, one, called=called) or Text(gap))
+            try:
+                items.append(make(evidence, name, one, called=called) or Text(gap))
+            except ParameterError as error:
+                raise ParameterError(f"{path}, {name}: {error}") from error
         source = "this paper" if path.parent == evidence.paper.folder else path.name
         sections.append((Section(f"declared-{number}", f"Tables of {source}"), items))
     return sections

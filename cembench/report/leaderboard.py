@@ -7,14 +7,15 @@ all runs stand together; seconds are only ever divided by seconds of the same ma
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections import Counter, defaultdict
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from math import inf
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.names import slug
-from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant
+from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant, difference
 from cembench.report.declarations import filled, own, parsed
 from cembench.report.declared import DeclaredTable, aggregate
 from cembench.report.document import (
@@ -90,10 +91,9 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
     from cembench.registry import load_registry
 
     registry, frames = load_registry(), []
-    usual, named = _usual_parameters(entrants), _of_one_title(entrants)
-    for number, entrant in enumerate(entrants):
+    pairs = zip(entrants, _apart(entrants), strict=True)
+    for number, (entrant, apart) in enumerate(pairs):
         evidence = entrant.evidence
-        apart = _apart(evidence, usual, named)
         environments = evidence.store.environments()
         names = [name for name in (*_SHOWN, *_READ) if name in evidence.frame]
         frame = evidence.frame[names]
@@ -115,42 +115,26 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
     )
 
 
-def _usual_parameters(entrants: Sequence[Entrant]) -> dict[str, Variant]:
-    """Return the parameters that most runs have for each algorithm."""
-    chosen = Counter(
-        (series.algorithm, series.variant)
-        for entrant in entrants
-        for series in entrant.evidence.series
-        if series.main
-    )
-    return {algorithm: variant for (algorithm, variant), _ in reversed(chosen.most_common())}
+def _apart(entrants: Sequence[Entrant]) -> list[dict[str, str]]:
+    """Return for each run new labels of algorithms that only share theirs with those of others.
 
-
-def _of_one_title(entrants: Sequence[Entrant]) -> Mapping[str, Collection[str]]:
-    """Return the names of the algorithms that have a label in some run."""
-    named: dict[str, set[str]] = {}
-    for series in (series for entrant in entrants for series in entrant.evidence.series):
-        named.setdefault(series.label, set()).add(series.algorithm)
-    return named
-
-
-def _apart(
-    evidence: Evidence, usual: Mapping[str, Variant], named: Mapping[str, Collection[str]]
-) -> dict[str, str]:
-    """Return new labels of a run's algorithms, of those that only share theirs with others.
-
-    Their parameters are not those of most runs, or another run has another algorithm of that title.
+    Another run has another algorithm of that title, or most runs have other parameters of it.
     """
-    labels = {}
-    for series in evidence.series:
-        others = [series.algorithm] * (len(named[series.label]) > 1)
-        others += [
-            f"{name}={value}"
-            for name, value in series.variant
-            if (name, value) not in usual.get(series.algorithm, series.variant)
-        ]
-        if series.main and others:
-            labels[series.label] = f"{series.label} ({', '.join(others)})"
+    mains = [[one for one in entrant.evidence.series if one.main] for entrant in entrants]
+    named: defaultdict[str, set[str]] = defaultdict(set)
+    chosen: defaultdict[str, Counter[Variant]] = defaultdict(Counter)
+    for one in chain.from_iterable(mains):
+        named[one.label].add(one.algorithm)
+        chosen[one.algorithm][one.variant] += 1
+    labels: list[dict[str, str]] = []
+    for series in mains:
+        labels.append({})
+        for one in series:
+            ((usual, _),) = chosen[one.algorithm].most_common(1)
+            words = [one.algorithm] * (len(named[one.label]) > 1)
+            words += [difference(one.variant, usual)] * (one.variant != usual)
+            if words:
+                labels[-1][one.label] = f"{one.label} ({', '.join(words)})"
     return labels
 
 

@@ -80,9 +80,7 @@ def average_interval(
     n = len(values)
     if n < FEWEST_FAMILIES:
         return None
-    half = _student(n - 1) * float(values.std(ddof=1)) / sqrt(n)
-    low, high = float(values.mean()) - half, float(values.mean()) + half
-    return Interval(float(np.exp(low)), float(np.exp(high))) if log else Interval(max(0, low), high)
+    return _around(float(values.mean()), float(values.std(ddof=1)) / sqrt(n), n, log=log)
 
 
 def rate_interval(
@@ -102,9 +100,8 @@ def rate_interval(
     if n < FEWEST_FAMILIES:
         return None
     error = sqrt(n / (n - 1) * sum(off**2 for off in held.values())) / len(values)
-    half = _student(n - 1) * error
-    low, high = float(values.mean()) - half, float(values.mean()) + half
-    return Interval(exp(low) - 1, exp(high) - 1) if log else Interval(max(-1, low - 1), high - 1)
+    around = _around(float(values.mean()), error, n, log=log)
+    return Interval(around.low - 1, around.high - 1)
 
 
 def enough_rounds(rounds: Sequence[int]) -> bool:
@@ -136,7 +133,10 @@ def _normal() -> float:
     return float(ndtri((1 + LEVEL) / 2))
 
 
-def _student(freedom: int) -> float:
+def _around(middle: float, error: float, families: int, *, log: bool) -> Interval:
+    """Return Student's interval of an average of positive figures, or of that of their `log`."""
     from scipy.special import stdtrit  # slow to import
 
-    return float(stdtrit(freedom, (1 + LEVEL) / 2))
+    half = float(stdtrit(families - 1, (1 + LEVEL) / 2)) * error
+    low, high = middle - half, middle + half
+    return Interval(exp(low), exp(high)) if log else Interval(max(0, low), high)

@@ -27,7 +27,7 @@ from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
-    maps_each,
+    maps_every_surface,
     quality_findings,
     together,
     without_map,
@@ -229,7 +229,7 @@ def _scaling(work: _Work) -> _Found:
     started = monotonic()
     sittings = [work.measured("scaling", meshes, beside, FIRST_ROUNDS)]
     ours = work.ours(sittings[0])
-    mapped = maps_each("scaling", ours)
+    mapped = maps_every_surface("scaling", ours)
     while True:
         growth = growth_of(sittings, work.name, beside[0] if beside else None)
         if growth is None:

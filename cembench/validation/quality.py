@@ -244,7 +244,7 @@ def without_map(records: Sequence[Record]) -> dict[str, str]:
     return {r.cell.mesh: r.outcome.cause or "" for r in records if _has_none(r)}
 
 
-def maps_each(stage: Stage, records: Sequence[Record]) -> ValidationFinding:
+def maps_every_surface(stage: Stage, records: Sequence[Record]) -> ValidationFinding:
     """Check that each record has a map, a map with folds, or a failure with a cause."""
     bad = [
         f"{r.cell.mesh}: {r.outcome.status}: {r.outcome.cause}"
@@ -269,7 +269,7 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
         else "the same bits in every round",
         ok=not changing,
     )
-    return [maps_each("quality", records), repeated]
+    return [maps_every_surface("quality", records), repeated]
 
 
 def _pair(

@@ -168,7 +168,7 @@ def _meets(requirement: Requirement, validation: Validation) -> bool:
 
 
 def _meets_against(requirement: Requirement, against: BaselineComparison) -> bool:
-    """Whether it is met on the surfaces, of which we map all that the baseline maps."""
+    """Whether it is met; never where the baseline alone has a map of a surface."""
     energy, speed = against.energy, against.speed
     if any(pair.energy is None and pair.baseline_energy is not None for pair in against.pairs):
         return False

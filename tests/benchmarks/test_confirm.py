@@ -20,8 +20,7 @@ def kept(tmp_path, monkeypatch):
     file.parent.mkdir()
     about = {"start": origins.MEASURING, "date": "2026-01-01", "hashes": {"harness": "old"}}
     file.write_text(json.dumps({"reports/a": about}))
-    for module in (study, origins):
-        monkeypatch.setattr(module, "FILE", file)
+    monkeypatch.setattr(origins, "FILE", file)
     monkeypatch.setattr(study, "ROOT", tmp_path)
     monkeypatch.setattr(study, "tree_at", lambda commit: origins.working_tree())
 

@@ -41,7 +41,7 @@ def test_the_rounds_of_the_records_give_the_averages_of_the_tables(policy):
     rounded = 10.0 ** (1 - DIGITS)  # a ratio of two seconds in the records
     there = readme_speedups.averages(folder / "tables" / readme_speedups.POLICIES[policy])
     for name in ("QIEM", "FDM", "LDM"):
-        rows = readme_speedups.rates(folder, name.lower(), policy).values()
+        rows = readme_speedups.rates(folder, name.lower(), policy)
         figures = np.exp([np.median(np.log(json.loads(row["ratios"]))) for row in rows])
         for reading, average in readme_speedups.AVERAGES.items():
             rate = average(figures) - 1

@@ -31,6 +31,7 @@ def face(cli):
     ("words", "message"),
     [
         (("map", "f.obj", "--program", "target=disk"), "needs --command COMMAND"),
+        (("map", "f.obj", "--command", "it's {input} {output}"), "cannot be split"),
         (
             ("map", "f.obj", "--command", "x {input} {output}", "--program", "colour=red"),
             "one of: ",

@@ -276,12 +276,14 @@ def test_a_wrong_scale_is_named_with_the_file_and_not_mended(tmp_path, cli):
     "options",
     [
         ("--remesh", "r.obj", "--side", 11),
+        ("--remesh", "../{here}/r.obj", "--side", 11),
         ("--preview", "--geometry-image", "r.png", "--side", 9),
         ("--checker", "--geometry-image", "r_texture.png", "--side", 9),
     ],
 )
 def test_two_outputs_of_one_name_are_refused(cli, options):
     cembench.write_mesh(cli.folder / "face.obj", cembench.surface("cone", 200))
+    options = [str(one).format(here=cli.folder.name) for one in options]
     code, _, err = cli("map", "face.obj", "-o", "r.obj", *options)
     assert code == 2
     assert "two files would be written to r" in err

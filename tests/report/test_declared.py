@@ -77,7 +77,7 @@ def test_the_report_has_it_in_all_forms(small_run, mine, tmp_path, quick_drawing
         ('[a]\ntitle = "A"\ncolumns = []', "a / columns: Tuple should have at least 1 item"),
         (
             '[a]\ntitle = "A"\nrows = "algorithm"\ncolumns = [{ title = "m", value = "seconds" }]',
-            "table 'a': 'seconds' has a value for each record; take one, e.g. median(seconds)",
+            "mine.toml, a: 'seconds' has a value for each record; take one, e.g. median(seconds)",
         ),
         (
             '[a]\ntitle = "A"\ncolumns = ["mesh"]\ncolour = 1',

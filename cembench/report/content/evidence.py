@@ -340,7 +340,7 @@ class Evidence:
                 elif titles[title] > 1 and target != DISK:
                     title = f"{title} ({target})"
                 title = in_lists(title)
-                label = title if k == 0 else f"{title} ({_difference(choice, choices[0])})"
+                label = title if k == 0 else f"{title} ({difference(choice, choices[0])})"
                 series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(series)
 
@@ -493,7 +493,8 @@ def _variant(cell: Cell, parameters: Mapping[str, Any]) -> Variant:
     return (*chosen, ("backend", cell.backend), ("threads", str(cell.threads)))
 
 
-def _difference(choice: Variant, main: Variant) -> str:
+def difference(choice: Variant, main: Variant) -> str:
+    """Return the parameters of a choice that are not those of the main one."""
     other = [pair for pair in choice if pair not in main] or choice
     return ", ".join(f"{name}={value}" for name, value in other)
 

@@ -19,12 +19,7 @@ from cembench.report.content.evidence import (
     Evidence,
 )
 from cembench.report.content.inspection import Inspection
-from cembench.report.content.printed_tables import (
-    MEAN_RATE,
-    measured,
-    measured_rates,
-    printed_rates,
-)
+from cembench.report.content.printed_tables import MEAN_RATE, measured, printed_rates
 from cembench.report.declarations import own
 from cembench.report.declared import declared_table
 from cembench.report.document import VERDICTS, Claim, Figure, Finding, Findings, Sentence
@@ -140,10 +135,10 @@ def _ends(interval: Interval | None) -> tuple[float, float] | None:
     return (interval.low, interval.high) if interval else None
 
 
-def _over_families(values: pd.Series, families: Sequence[str]) -> Over:
+def _over_families(values: Sequence[float], families: Sequence[str]) -> Over:
     """Return the geometric mean over families of the geometric means within them."""
     logs = family_means([log(value) for value in values], families)
-    return Over(exp(mean(logs)), exp(median(logs)), average_interval(values.tolist(), families))
+    return Over(exp(mean(logs)), exp(median(logs)), average_interval(values, families))
 
 
 def _speeds(
@@ -155,8 +150,6 @@ def _speeds(
     otherwise the means over the surfaces in each round do, a statement on these surfaces. Surfaces
     on which they share no round are left out. The second value is the number of families.
     """
-    import pandas as pd
-
     slower, faster = ([evidence.by_key[key] for key in keys[good[k]]] for k in (1, 0))
     paired = [paired_ratios(a, b) for a, b in zip(slower, faster, strict=True)]
     families = [family for family, ratios in zip(families, paired, strict=True) if ratios]
@@ -164,7 +157,7 @@ def _speeds(
     if not ratios:
         return None, 0
     if len(set(families)) >= FEWEST_FAMILIES:
-        middles = pd.Series([exp(median(map(log, ratio))) for ratio in ratios])
+        middles = [exp(median(map(log, ratio))) for ratio in ratios]
         over = _over_families(middles, families)
         compared = Comparison(over.mean, over.interval, verdict_of(over.interval), len(ratios))
         return compared, len(set(families))
@@ -330,11 +323,11 @@ def _rates(evidence: Evidence, policy: str) -> tuple[str, bool]:
     """Return the measured averages as text, and whether one of them has an interval."""
     phrases, sure = [], False
     for algorithm in evidence.paper.compared:
-        rates = list(measured_rates(evidence, algorithm, policy).values())
         rows = measured(evidence, algorithm, policy).dropna(subset="speedup")
-        rounds = rows["paired"].tolist()
-        ratios = (1 + rows["speedup"]).tolist()
-        interval = enough_rounds(rounds) and rate_interval(ratios, rows["family"], log=False)
+        rates = rows["speedup"].tolist()
+        interval = enough_rounds(rows["paired"].tolist()) and rate_interval(
+            [1 + rate for rate in rates], rows["family"], log=False
+        )
         between = f" ({interval.low:.1f} to {interval.high:.1f})" if interval else ""
         phrases.append(f"{MEAN_RATE.of(rates):.1f}{between}" if rates else "not measured")
         sure = sure or bool(interval)
