@@ -22,7 +22,7 @@ from cembench.results.comparison import (
 from cembench.results.intervals import Interval, next_look, share_of
 from cembench.results.records import Cell, Ended, Outcome, Record, Round, lower_median
 from cembench.results.samples import Samples
-from cembench.running.measure import ENOUGH_SECONDS
+from cembench.running.measure import ENOUGH_SECONDS, LONG_CALL
 from cembench.running.options import Options
 from cembench.running.plan import Task
 
@@ -228,9 +228,14 @@ def each_round(seconds: float) -> float:
 
 def cost(rounds: Rounds) -> float:
     """Return the estimated seconds of another round of a cell, based on the last one."""
-    calls, shared = rounds[-1].calls, rounds[-1].together
-    more = sum(shared) + max(shared) if shared else 0.0
-    return BESIDE_CALLS + sum(calls) + max(calls) + more  # one call more each, to warm up
+    each = (rounds[-1].calls, rounds[-1].together)
+    return BESIDE_CALLS + sum(_with_warm_up(calls) for calls in each if calls)
+
+
+def _with_warm_up(calls: Sequence[float]) -> float:
+    """Return the seconds of a process's calls, with the first one if that was not timed."""
+    longest = max(calls)
+    return sum(calls) + (longest if longest <= LONG_CALL else 0.0)
 
 
 def affordable(

@@ -15,7 +15,7 @@ from cembench.running import local
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.schedule import affordable, cheapest, cost, lack
+from cembench.running.schedule import BESIDE_CALLS, affordable, cheapest, cost, lack
 from cembench.running.watcher import Watcher
 
 
@@ -236,7 +236,11 @@ def test_the_widest_go_on_first_and_pay_for_their_reference():
     assert chosen[0] == set()
     assert chosen[1] == {"wider", "cem"}
     assert chosen[2] == chosen[3] == {"wide", "wider", "cem"}
-    assert cost(rounds(2.0)) > 4
+
+
+def test_a_round_costs_its_calls_and_a_warm_up_that_long_calls_lack():
+    assert cost(rounds(2.0)) == 2.0 + 2.0 + BESIDE_CALLS
+    assert cost(rounds(20.0)) == 20.0 + BESIDE_CALLS
 
 
 def test_before_the_first_look_the_cheapest_go_on_with_their_reference():
