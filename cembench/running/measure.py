@@ -130,6 +130,7 @@ class TimedCalls:
             preparing=preparing * len(alone),
             own=sum(call.after.process - call.before.process for call in counted),
             others=sum(call.after.others - call.before.others for call in counted),
+            helping=sum(call.after.beside - call.before.beside for call in counted),
             beside=sum(b.beside - a.beside for a, b in gaps),
             disturbed=sum(call.before.running > 0 for call in calls[1:]),
             looked=len(calls) - 1,

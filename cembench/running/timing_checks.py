@@ -16,7 +16,8 @@ from cembench.results.records import Fault, FaultKind, Round, lower_median
 #: Tolerance of CPU time over wall-clock time, per thread, for the resolution of clocks: a share,
 #: and seconds of a round. The CPU time of other processes is counted in hundredths of a second.
 MORE, GRAIN, GRAIN_OF_OTHERS = 0.1, 0.002, 0.02
-#: Tolerated CPU seconds between the calls, as a share of the calls and absolute.
+#: Tolerated CPU seconds of all but the calling thread, between or within the calls: a share of the
+#: calls, and absolute. A thread that ends its work or wakes at times is no work ahead and no help.
 BESIDE, LITTLE = 0.05, 0.005
 #: Tolerated CPU seconds of the calling thread between the calls: a share of the calls, for garbage
 #: that they leave to the collector, and a multiple of what preparing a call takes.
@@ -40,6 +41,8 @@ class Used(BaseModel):
     #: CPU seconds in these calls: of all threads of the process, and of its children.
     own: float = 0.0
     others: float = 0.0
+    #: CPU seconds in these calls, of all threads except the calling one.
+    helping: float = 0.0
     #: CPU seconds between the calls, of all threads except the calling one.
     beside: float = 0.0
     #: CPU seconds between the calls of the calling thread, and what preparing as many calls took
@@ -72,7 +75,8 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
         )
         reasons.append(Fault(kind=FaultKind.MORE_CORES, detail=message))
     crowded = [count for count in running if count > threads]
-    if not reasons and len(crowded) >= LEAST_CROWDED and len(crowded) > CROWDED * len(running):
+    often = len(crowded) >= LEAST_CROWDED and len(crowded) > CROWDED * len(running)
+    if not reasons and often and used.helping > BESIDE * used.wall + LITTLE:
         message = (
             f"{max(crowded)} threads or processes were running at the same time, in "
             f"{len(crowded)} of {len(running)} samples, but {threads} may be used. Allow more "
@@ -81,7 +85,7 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
         reasons.append(Fault(kind=FaultKind.MORE_CORES, detail=message))
     # With several threads, a library's idle thread pool may spin.
     much = used.beside > BESIDE * used.wall + LITTLE + grain - GRAIN
-    often = used.disturbed > 1 and 2 * used.disturbed > used.looked
+    before = 2 * used.disturbed > max(used.looked, 2) and used.beside > BESIDE * used.between
     late = used.between > LEFT * (used.cold + used.wall) + PREPARING * used.preparing + LITTLE
     if late:
         message = (
@@ -92,7 +96,7 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
             "with gc.collect()"
         )
         reasons.append(Fault(kind=FaultKind.WORKS_AHEAD, detail=message))
-    elif threads == 1 and (much or often):
+    elif threads == 1 and (much or before):
         message = (
             f"work went on between the timed calls: {used.beside:.3g} s of CPU time "
             f"besides {used.wall:.3g} s of calls, before {used.disturbed} of {used.looked} calls. "

@@ -11,6 +11,7 @@ import sys
 import tempfile
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
@@ -117,6 +118,15 @@ def keeps_ordering(mesh: DiskMesh) -> Parameterization:
     return Parameterization(work(mesh))
 
 
+pool = []
+
+
+@algorithm("pool", title="Works in a pool of one", target="disk", conformal=False)
+def pool_of_one(mesh: DiskMesh) -> Parameterization:
+    pool.extend([] if pool else [ThreadPoolExecutor(1)])
+    return Parameterization(pool[0].submit(work, mesh).result())
+
+
 def endless():
     while True:
         np.sort(np.random.default_rng(0).random(100_000))
@@ -140,7 +150,7 @@ def zeros_later(mesh: DiskMesh) -> Parameterization:
 
 @algorithm("eight-threads", title="Eight threads", target="disk", conformal=False)
 def eight_threads(mesh: DiskMesh) -> Parameterization:
-    numbers = np.random.default_rng(0).random((8, 1_000_000))
+    numbers = np.random.default_rng(0).random((8, 3_000_000))
     threads = [threading.Thread(target=row.sort) for row in numbers]
     for thread in threads:
         thread.start()

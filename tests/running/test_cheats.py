@@ -43,6 +43,7 @@ FOUND = {
     "noise": FaultKind.OTHER_MAP,
     "kept-factor": None,
     "factor-by-triangles": None,
+    "pool": None,
 }
 #: Not deterministic, which `validate` refuses: `run` times all of their work.
 RANDOM = ("noise-over-map", "random")
