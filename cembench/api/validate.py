@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cembench.api.settings import MOST_FACES, AnyPath, Rounds, Timeout
+from cembench.api.settings import MOST_FACES, AnyPath, Rounds, Threads, Timeout
 from cembench.core.arguments import Range, checked
 from cembench.core.reporter import SILENT, Reporter
 from cembench.results.intervals import DEFAULT_ROUNDS
@@ -33,6 +33,7 @@ def validate(
     parameters: Mapping[str, Any] | None = None,
     require: Sequence[Literal["faster", "not-slower", "better", "not-worse", "no-folds"]] = (),
     checks_only: bool = False,
+    threads: Threads = 1,
     timeout: Timeout = 120.0,
     output: AnyPath | None = None,
     reporter: Reporter = SILENT,
@@ -67,6 +68,8 @@ def validate(
         What the solver must also be to pass: faster, not-slower, better, not-worse, no-folds.
     checks_only : bool
         Check contract and correctness only, without timing.
+    threads : int
+        Threads of the numerical libraries, the baselines' too.
     timeout : float
         Time limit of a call, in seconds.
     output : path, optional
@@ -133,7 +136,7 @@ def validate(
         command=reporter.command,
     )
     hooks = ValidationHooks(reporter.step, lambda cells: reporter.watching(cells, resumes=False))
-    solver = Solver(algorithm, plugins, arguments, in_a_process(options))
+    solver = Solver(algorithm, plugins, arguments, threads, in_a_process(options))
     with _folder(output) as folder:
         validation = examine(solver, registry, folder, asked, hooks)
         if output is not None:

@@ -189,7 +189,7 @@ class _Work:
         """Measure the algorithms side by side in one sitting; earlier records are not used."""
         chosen = [self.solver.algorithm, *(self.registry.algorithm(name) for name in beside)]
         parameters = {f"{self.name}.{key}": value for key, value in self.solver.parameters.items()}
-        how = MeasurementSettings(repeats=rounds)
+        how = MeasurementSettings(threads=self.solver.threads, repeats=rounds)
         plan = (how, self.solver.plugins, self.asked.standing)
         tasks = plan_cells(chosen, meshes, parameters, *plan)
         options = replace(self.asked.options, fresh=True)

@@ -54,11 +54,13 @@ class Solver:
     algorithm: Algorithm
     plugins: tuple[str, ...] = ()
     parameters: Mapping[str, Any] = field(default_factory=dict)
+    #: Threads of its numerical libraries.
+    threads: int = 1
     call: Call = field(default_factory=lambda: in_a_process(Options(timeout=120.0)))
 
     def map(self, mesh: TriangleMesh, solves: str = "reuse") -> CheckedMap:
         """Map a surface under this linear-algebra policy, and return the checked map."""
-        how = MeasurementSettings(solves=solves, repeats=1)
+        how = MeasurementSettings(solves=solves, threads=self.threads, repeats=1)
         (task,) = plan_cells([self.algorithm], [mesh], self.parameters, how, self.plugins)
         return CheckedMap(mesh, *self.call(task))
 

@@ -24,7 +24,7 @@ def here(cli, monkeypatch):
 
 
 def test_a_right_solver_is_valid_and_its_page_is_written(here):
-    code, out, err = here("right", *TINY, "-o", "there", "--against", "cem,lscm")
+    code, out, err = here("right", *TINY, "-o", "there", "--against", "cem,lscm", "--threads", 2)
     assert code == 0
     said = " ".join(out.split())
     assert (
@@ -38,7 +38,8 @@ def test_a_right_solver_is_valid_and_its_page_is_written(here):
     data = json.loads((here.folder / "there/validation.json").read_text())
     assert [a["baseline"] for a in data["against"]] == ["cem", "lscm"]
     (record, *_) = (here.folder / "there/quality/records").glob("*.json")
-    assert Record.model_validate_json(record.read_bytes()).outcome.status == "ok"
+    kept = Record.model_validate_json(record.read_bytes())
+    assert (kept.outcome.status, kept.cell.threads) == ("ok", 2)
 
 
 def test_a_wrong_one_is_invalid_and_the_stages_behind_are_not_reached(here):
