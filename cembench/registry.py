@@ -217,8 +217,9 @@ def algorithm(
         The third-party library that computes the map; tables name it, and its version is recorded.
     combinatorial : bool
         Whether the map depends on the triangles alone, so that another shape with the same
-        triangles has the same map. Any other method that returns an unchanged map for a changed
-        shape is suspected of returning a stored result.
+        triangles has the same map, up to the Moebius map of a gauge; `validate` tests it. Any other
+        method that returns an unchanged map for a changed shape is suspected of returning a stored
+        result.
 
     Returns
     -------

@@ -45,6 +45,9 @@ SAME_ENERGY = 1e-6
 #: Largest distance of a vertex, relative to the image's size, between maps that are equal to
 #: rounding, and between maps of two motions.
 SAME_MAP, NEARLY_THE_SAME = 1e-8, 1e-4
+#: Largest distance of a vertex, relative to the image's size, between maps that differ by a
+#: rotation, a scale and a shift: a stretch of the surface changes maps by 1e-9 at least.
+SAME_SHAPE = 1e-12
 #: Largest difference between a map of a process with earlier calls and one of a fresh process, as
 #: a multiple of that between fresh ones, for which a randomised solver is believed to keep nothing.
 SCATTER = 10.0
@@ -138,13 +141,16 @@ def judged_calls(
     `known` holds samples of maps from other processes by motion, in the surface's own order; that
     of :data:`UNMOVED` is the checked one.
     """
-    seen = {checked.uv_hash: UNMOVED}
+    seen, shapes = {checked.uv_hash: UNMOVED}, dict(known)
     repeated, far, doubtful = None, None, None
     for name, motion, uv in maps:
-        bits = hash_of(uv)
-        if seen.setdefault(bits, motion) != motion and not promise.combinatorial:
+        bits, mine = hash_of(uv), sample(in_first_order(uv, mesh, motion))
+        others = [one for other, one in shapes.items() if other != motion]
+        kept = seen.setdefault(bits, motion) != motion or _is_among(others, mine)
+        shapes.setdefault(motion, mine)
+        if kept and not promise.combinatorial:
             message = (
-                f"{name} returned the identical map for a surface of another shape: the map was "
+                f"{name} returned the same map for a surface of another shape: the map was "
                 "kept from another call, or does not depend on the coordinates (then declare "
                 "combinatorial=True)"
             )
@@ -159,7 +165,6 @@ def judged_calls(
             wrong = wrong or _other_energy(promise, surface, uv, checked)
         only_energy = wrong and wrong[0].kind is FaultKind.OTHER_ENERGY
         other = known.get(motion)
-        mine = sample(in_first_order(uv, mesh, motion))
         if other is not None:
             apart = difference(mine, other)
             repeated = repeated is not False and apart <= SAME_MAP
@@ -181,6 +186,23 @@ def difference(mine: Complex, other: Complex) -> float:
     if mine.shape != other.shape:
         return math.inf
     return float(np.abs(mine - other).max() / max(np.abs(other).max(), 1e-300))
+
+
+def _is_among(others: Sequence[Complex], mine: Complex) -> bool:
+    """Whether a map has the shape of two others, or of the only other one.
+
+    Two of many may agree by chance, where a map depends on one length of the surface alone.
+    """
+    return sum(_same_shape(mine, one) for one in others) >= min(2, len(others)) > 0
+
+
+def _same_shape(mine: Complex, other: Complex) -> bool:
+    """Whether the sample of a map is another one's, turned, scaled and shifted."""
+    if mine.shape != other.shape:
+        return False
+    a, b = other - other.mean(), mine - mine.mean()
+    turn = np.vdot(a, b) / max(np.vdot(a, a).real, 1e-300)
+    return bool(turn) and difference(turn * a, b) <= SAME_SHAPE
 
 
 def _other_energy(

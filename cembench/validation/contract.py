@@ -12,7 +12,9 @@ from cembench.conformal.laplacian import delaunay_laplacian
 from cembench.core.errors import ParameterError
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import FaultKind
+from cembench.running.map_checks import SAME_MAP
 from cembench.validation import surfaces
+from cembench.validation.alignment import distance
 from cembench.validation.finding import ValidationFinding, finding
 from cembench.validation.solver import CheckedMap, Solver
 
@@ -38,6 +40,7 @@ def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFindi
         leaves_mesh_unchanged(first),
         reports_its_energy(first),
         is_repeatable(first, solver.map(uneven)),
+        *_depends_on_triangles(solver, first),
         handles_unusual_meshes([solver.map(mesh) for mesh in surfaces.awkward(registry, kind)]),
     ]
 
@@ -110,6 +113,19 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
         "the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
         ok=same,
     )
+
+
+def _depends_on_triangles(solver: Solver, first: CheckedMap) -> list[ValidationFinding]:
+    """Check what is declared with combinatorial=True, up to the gauge; else there is no finding."""
+    if not solver.algorithm.combinatorial:
+        return []
+    second = solver.map(surfaces.reshaped(first.mesh))
+    apart = math.inf
+    if first.uv is not None and second.uv is not None:
+        free = solver.algorithm.target == "free boundary"
+        apart = distance(second.uv, first.uv, moebius=not free)
+    measured = f"maps of two shapes with the same triangles differ by {apart:.2g}"
+    return [_finding("combinatorial", measured, ok=apart <= SAME_MAP, within=SAME_MAP)]
 
 
 def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:

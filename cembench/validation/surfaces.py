@@ -115,6 +115,11 @@ def moved(mesh: TriangleMesh) -> TriangleMesh:
     return type(mesh).from_arrays(V, mesh.F, name=f"{mesh.name}, moved")
 
 
+def reshaped(mesh: TriangleMesh) -> TriangleMesh:
+    """Return a surface of another shape with the same triangles."""
+    return type(mesh).from_arrays(mesh.V * [1.0, 0.7, 1.5], mesh.F, name=f"{mesh.name}, reshaped")
+
+
 def renumbered(mesh: TriangleMesh) -> tuple[TriangleMesh, NDArray[np.int64]]:
     """Return the surface with vertices, triangles and corners reordered, and the new numbers."""
     rng = np.random.default_rng(4)

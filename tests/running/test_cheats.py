@@ -30,6 +30,7 @@ FOUND = {
     "by-triangles": FaultKind.KEPT_RESULT,
     "by-shape": FaultKind.KEPT_RESULT,
     "on-disk-by-name": FaultKind.KEPT_RESULT,
+    "turned": FaultKind.KEPT_RESULT,
     "keeps-laplacian": FaultKind.KEPT_RESULT,
     "precomputed": FaultKind.KEPT_RESULT,
     "zeros-later": FaultKind.OTHER_MAP,

@@ -125,12 +125,28 @@ def turned(by):
     return FLAT * np.exp(1j * by)
 
 
+def stretched(by):
+    return FLAT + by * FLAT.conj() * (1 - abs(FLAT) ** 2)
+
+
 def test_the_map_of_another_shape_is_a_kept_one_unless_no_coordinates_count():
     a, b = f"a{NUMBERS_KEPT}", f"b{NUMBERS_KEPT}"
     assert [f.kind for f in judged([(a, FLAT)]).kept] == [FaultKind.KEPT_RESULT]
     assert judged([(a, turned(1e-6)), (b, turned(1e-6))]).kept
     assert judged([(a, FLAT), (b, FLAT)], combinatorial=True).kept == ()
-    assert judged([("a", turned(1e-6)), ("b", turned(2e-6))]).kept == ()
+    assert judged([("a", turned(1e-6)), ("b", stretched(1e-6))]).kept == ()
+
+
+def test_a_map_that_was_turned_and_put_into_other_numbers_is_a_kept_one():
+    assert [f.kind for f in judged([("a", FLAT), ("b", turned(1e-6))]).kept] == [
+        FaultKind.KEPT_RESULT
+    ]
+    assert judged([("a", turned(1e-6))], {"b": FLAT}).kept
+    assert judged([("a", FLAT), ("b", turned(1e-6))], combinatorial=True).kept == ()
+    assert judged([("a", FLAT), ("b", stretched(1e-9))]).kept == ()
+    by_chance = [("a", FLAT), ("b", stretched(1e-7)), ("c", turned(1e-6))]
+    assert judged(by_chance).kept == ()
+    assert judged([*by_chance, ("d", turned(2e-6))]).kept
 
 
 def test_the_same_surface_has_the_same_map_to_rounding_in_every_process():

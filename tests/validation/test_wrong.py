@@ -20,6 +20,7 @@ CAUGHT_BY = {
     "boasts": "energy history",
     "miscounts": "energy history",
     "by-chance": "repeatable",
+    "not-combinatorial": "combinatorial",
     "nan-sometimes": "awkward meshes",
     "crashes-without-interior": "awkward meshes",
     "mirrored": "orientation",

@@ -27,6 +27,11 @@ def right_one(mesh: DiskMesh) -> Parameterization:
     return cem(mesh)
 
 
+@algorithm("not-combinatorial", title="Declares what is not so", target="disk", combinatorial=True)
+def not_combinatorial(mesh: DiskMesh) -> Parameterization:
+    return cem(mesh)
+
+
 @algorithm("parameters", title="Its default is out of range", target="disk")
 def default_out_of_range(
     mesh: DiskMesh, *, steps: Annotated[int, Field(ge=1)] = 0
