@@ -7,6 +7,8 @@ import json
 import os
 import platform
 import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -35,13 +37,28 @@ _OFFERED = Path("/sys/kernel/mm/transparent_hugepage/enabled")
 #: Names the machine in records; set it where the system's name changes, as in containers.
 MACHINE_VARIABLE = "CEMBENCH_MACHINE"
 _LIBRARIES = ("numpy", "scipy", "cvxopt", "libigl", "pymetis", "pypardiso", "pydantic")
+#: Variables that plug-ins changed when they were imported, with their values before (None: unset).
+_CHANGED: dict[str, str | None] = {}
+
+
+@contextmanager
+def importing() -> Iterator[None]:
+    """Import plug-ins here: what they change in the environment, no measuring process gets."""
+    before = dict(os.environ)
+    try:
+        yield
+    finally:
+        for name in before.keys() | os.environ.keys():
+            if os.environ.get(name) != before.get(name):
+                _CHANGED.setdefault(name, before.get(name))
 
 
 def for_measuring(threads: int) -> dict[str, str]:
     """Return the environment of processes whose calls are timed.
 
     Numerical libraries use `threads` threads, and memory is handled as :data:`ALLOCATOR` says,
-    unless the user's own settings of the allocator say otherwise.
+    unless the user's own settings of the allocator say otherwise. A process that imports a plug-in
+    itself has the variables that this sets, but no other one has.
 
     Examples
     --------
@@ -49,11 +66,12 @@ def for_measuring(threads: int) -> dict[str, str]:
     '1'
 
     """
-    own = [one for one in os.environ.get(ALLOCATOR_VARIABLE, "").split(":") if one]
+    given = {name: value for name, value in (os.environ | _CHANGED).items() if value is not None}
+    own = [one for one in given.get(ALLOCATOR_VARIABLE, "").split(":") if one]
     named = {one.partition("=")[0] for one in own}
     ours = [f"{name}={value}" for name, value in ALLOCATOR.items() if name not in named]
     allocator = {ALLOCATOR_VARIABLE: ":".join(own + ours)}
-    return os.environ | dict.fromkeys(THREAD_VARIABLES, str(threads)) | allocator
+    return given | dict.fromkeys(THREAD_VARIABLES, str(threads)) | allocator
 
 
 def usable_cores() -> int:

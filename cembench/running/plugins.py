@@ -14,6 +14,7 @@ from pathlib import Path
 
 from cembench.core.errors import RegistryError, describe_error
 from cembench.registry import COMMAND, Registry, declared_by, load_registry
+from cembench.running.environment import importing
 from cembench.running.process import Limits, ProcessEnd, die_with_parent, run_limited, spawning
 
 #: Time limit for importing a plug-in, in wall-clock seconds.
@@ -35,7 +36,8 @@ def load_with_plugins(plugins: Sequence[str], seconds: float = IMPORT_SECONDS) -
     for plugin in plugins:
         if not plugin.startswith(COMMAND):  # data only, which imports nothing
             _try(plugin, seconds)
-    return load_registry(plugins)
+    with importing():
+        return load_registry(plugins)
 
 
 def _try(plugin: str, seconds: float) -> None:

@@ -1,11 +1,13 @@
 """What a plug-in does while it is imported ends another process than ours, and is told."""
 
+import os
 import textwrap
 
 import pytest
 
 from cembench import RegistryError
 from cembench.registry import load_registry
+from cembench.running import environment
 from cembench.running.plugins import load_with_plugins
 
 GOOD = """
@@ -51,6 +53,21 @@ def test_a_plugin_that_is_never_done_importing_is_told(plugin):
 
 def test_a_good_plugin_is_loaded(plugin):
     assert load_with_plugins([plugin("")]).algorithm("mine").title == "Mine"
+
+
+def test_what_an_import_changes_in_the_environment_no_measuring_process_gets(plugin, monkeypatch):
+    monkeypatch.setattr(environment, "_CHANGED", {})
+    for name, value in {"GIVEN": "user's", "KEPT": "user's", "NEW": ""}.items():
+        monkeypatch.setenv(name, value)
+    monkeypatch.delenv("NEW")
+    changes = "import os; os.environ.update(GIVEN='other', NEW='1', GLIBC_TUNABLES='a=b')"
+    monkeypatch.setenv("GLIBC_TUNABLES", "c=d")
+    load_with_plugins([plugin(changes)])
+    assert os.environ["GIVEN"] == "other"  # for what the plug-in does in this process
+    found = environment.for_measuring(1)
+    assert (found["GIVEN"], found["KEPT"]) == ("user's", "user's")
+    assert "NEW" not in found
+    assert found["GLIBC_TUNABLES"].startswith("c=d:")
 
 
 @pytest.mark.parametrize("verb", [["run", "--plugin"], ["validate"]])

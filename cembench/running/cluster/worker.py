@@ -34,7 +34,7 @@ from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster import host
 from cembench.running.cluster.units import PluginFiles, Unit
-from cembench.running.environment import describe_environment, machine_name, usable_cores
+from cembench.running.environment import describe_environment, importing, machine_name, usable_cores
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import Task
@@ -196,7 +196,8 @@ def measure(unit: Unit, mesh: TriangleMesh, store: Store, forwarder: Forwarder) 
 @cache
 def _algorithm(name: str, plugins: tuple[str, ...]) -> Algorithm:
     """Return an algorithm, loaded once in a process: the folders of plug-ins change with them."""
-    return load_algorithm(name, plugins)
+    with importing():
+        return load_algorithm(name, plugins)
 
 
 def _options(unit: Unit) -> Options:
