@@ -19,15 +19,19 @@ from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from time import monotonic
 
 import numpy as np
 
 from cembench.linear_algebra.cholesky import linear_algebra
 from cembench.running import worker
 from cembench.running.process import MARK, Start, die_with_parent
+from cembench.running.processor import children, keep_orphans
 
 #: Placeholder in the server's environment, as long as the mark that a forked process writes there.
 _NO_MARK = "0" * 32
+#: Seconds within which what a process left is ended; what starts processes faster stays.
+_MOST_SECONDS = 5.0
 
 
 class ServerGoneError(Exception):
@@ -121,6 +125,7 @@ class _Forked:
         return self._ask("poll")
 
     def wait(self, timeout: float | None = None) -> int:
+        """Wait for the end, after which the server ends what the process left."""
         code = self._ask("wait")
         assert code is not None
         return code
@@ -130,7 +135,7 @@ class _Forked:
             os.kill(self.pid, signal.SIGKILL)
 
     def _ask(self, what: str) -> int | None:
-        if self.code is None:
+        if self.code is None or what == "wait":
             try:
                 self.code = self.server.ask(what)
             except ServerGoneError:
@@ -158,6 +163,8 @@ def _serve() -> _ForkRequest:
             if code is None:
                 pid, status = os.waitpid(child, os.WNOHANG if request == "poll" else 0)
                 code = os.waitstatus_to_exitcode(status) if pid else None
+            if request == "wait":
+                _end_children()
             _say(number, code)
             continue
         child, code = os.fork(), None
@@ -167,6 +174,21 @@ def _serve() -> _ForkRequest:
             os.setpgid(child, child)
         _say(number, child)
     os._exit(0)
+
+
+def _end_children() -> None:
+    """End what a process left, its orphans: this server has adopted them.
+
+    One may have left its group, its environment and its limits, and be a new process every moment.
+    """
+    until = monotonic() + _MOST_SECONDS
+    with suppress(ChildProcessError):  # none is left
+        while monotonic() < until:
+            while os.waitpid(-1, os.WNOHANG)[0]:
+                """It has ended."""
+            for child in children():
+                with suppress(PermissionError):
+                    os.kill(child, signal.SIGKILL)
 
 
 def _say(number: int, answer: int | None) -> None:
@@ -206,6 +228,7 @@ def _load(backend: str) -> None:
 def _main(parent: int, backend: str) -> None:
     """Load the libraries, serve requests, and run the job in each forked process."""
     die_with_parent(parent)
+    keep_orphans()
     _load(backend)
     order = _serve()
     _set_up_process(order)

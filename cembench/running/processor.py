@@ -106,6 +106,13 @@ def _of_children() -> float:
     return total
 
 
+def children() -> list[int]:
+    """Return the ids of the children of this process, which has one thread; quickly if possible."""
+    with suppress(OSError):
+        return [*map(int, Path(f"/proc/self/task/{os.getpid()}/children").read_text().split())]
+    return [child.pid for child in psutil.Process().children()]
+
+
 def _has_children() -> bool:
     """Whether there may be children, read from two files if the system has them."""
     tasks = Path("/proc/self/task")

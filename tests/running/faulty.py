@@ -8,6 +8,7 @@ import subprocess
 import sys
 import time
 import warnings
+from pathlib import Path
 
 import numpy as np
 
@@ -200,6 +201,29 @@ def daemonises(mesh: DiskMesh) -> Parameterization:
     child = int(os.read(told, 20))
     note_child(child)
     return Parameterization(good_map(mesh), extras={"child": child})
+
+
+HOPS = """
+import os, resource, sys, time
+resource.setrlimit(resource.RLIMIT_MSGQUEUE, (1, 1))
+end = time.monotonic() + 30
+while time.monotonic() < end:
+    with open(sys.argv[1], "a") as file:
+        print(os.getpid(), file=file)
+    time.sleep(0.005)
+    if os.fork():
+        os._exit(0)
+"""
+
+
+@algorithm("hops", title="Leaves a process without a mark that is ever another one", target="disk")
+def hops(mesh: DiskMesh) -> Parameterization:
+    file = Path(os.environ["FAULTY_CHILDREN"])
+    command = [sys.executable, "-S", "-c", HOPS, file]
+    subprocess.Popen(command, env={}, start_new_session=True)
+    while not file.exists() or len(file.read_text().split()) < 5:
+        time.sleep(0.01)
+    return Parameterization(good_map(mesh))
 
 
 @algorithm("draws", title="Draws from the global generator", target="disk")

@@ -87,6 +87,18 @@ def test_what_a_forked_process_leaves_is_ended(timer, name, tmp_path, monkeypatc
         )
 
 
+def test_what_takes_off_all_marks_and_is_ever_another_process_is_ended(
+    timer, tmp_path, monkeypatch
+):
+    file = tmp_path / "children"
+    monkeypatch.setenv("FAULTY_CHILDREN", str(file))
+    assert timer.check(tasks_of("hops")[0])[0].status == "ok"
+    before = file.read_text()
+    time.sleep(0.2)
+    assert file.read_text() == before
+    assert not psutil.Process(timer.launcher._server.pid).children()
+
+
 def test_the_global_generator_differs_from_process_to_process(timer):
     (task,) = tasks_of("draws")
     checked, _ = timer.check(task)
