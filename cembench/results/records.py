@@ -244,7 +244,7 @@ class Round(BaseModel):
     #: Wall-clock seconds of each timed call in a process shared with the cells that this one is
     #: compared with; empty without one.
     together: tuple[CallSeconds, ...] = ()
-    #: Key from which the motion of the surface for each call is derived
+    #: The motion of the surface for each call, untimed ones too, by which it can be made again
     #: (:mod:`cembench.running.rigid_motion`).
     motions: str = ""
     #: Whether a call agreed to rounding with another process's call on the same moved surface;

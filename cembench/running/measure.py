@@ -47,7 +47,7 @@ from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.processor import Processor, after_call, before_call
 from cembench.running.quality import better_parameters
-from cembench.running.rigid_motion import UNMOVED, moved
+from cembench.running.rigid_motion import UNMOVED, drawn, moved
 from cembench.running.sanitized_result import (
     Returned,
     finite,
@@ -145,7 +145,7 @@ class Timed:
 
     The first `untimed` calls are not timed: a warm-up, and perhaps another one. With
     `first_counts`, a first call of more than :data:`LONG_CALL` seconds is timed, and no other.
-    Without `motions` the surface is not moved.
+    Without `motions` the surface is not moved; what they leave open is drawn as a call begins.
     """
 
     algorithm: Algorithm
@@ -392,11 +392,11 @@ def _timed(
 
     def once(number: int, *, counts: bool) -> None:
         (one, call), mine = cells[number], by_cell[number]
-        motion = one.motions[len(mine.calls)] if one.motions else UNMOVED
         gc.collect()
         gc.disable()
         try:
             # Made after the collection, so that no finaliser or callback could see it.
+            motion = drawn(one.motions[len(mine.calls)]) if one.motions else UNMOVED
             surface = moved(mesh, motion)
             before = before_call()
             returned, timing = call(surface)

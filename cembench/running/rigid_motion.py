@@ -14,6 +14,8 @@ and so the work stays the same.
 from __future__ import annotations
 
 import hashlib
+import re
+from os import urandom
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,9 +27,10 @@ Complex = NDArray[np.complex128]
 
 #: Name of the identity motion.
 UNMOVED = ""
-#: How the name of a motion ends that keeps the numbers of vertices and triangles. Call k of a round
-#: (from 0, untimed ones included) has the motion "TURN k", where TURN is the round's `motions`.
+#: How the name of a motion ends that keeps the numbers of vertices and triangles.
 NUMBERS_KEPT = " (numbers kept)"
+#: What stands for the name of a motion that is drawn when its call begins.
+DRAWN_LATER = "?"
 #: Relative stretch, largest against smallest length; it reveals kept results.
 STRETCH = 1e-6
 #: Largest angle in radians, shift as a share of the surface's size, and relative change of scale;
@@ -58,6 +61,17 @@ def motion(name: str) -> tuple[Real, Real]:
     stretch = Q @ np.diag([0.0, rng.uniform(0.4, 0.6), 1.0]) @ Q.T
     scale = 1 + SCALE * rng.uniform(-1, 1)
     return scale * rotation @ (np.eye(3) + STRETCH * stretch), SHIFT * rng.uniform(-1, 1, 3)
+
+
+def drawn(name: str) -> str:
+    """Return the name of a motion, drawn now if it is open: nobody knows it before the call."""
+    return name.replace(DRAWN_LATER, urandom(6).hex())
+
+
+def may_be(name: str, asked: str) -> bool:
+    """Whether this name of a motion can have been drawn for the one that was asked for."""
+    pattern = re.escape(asked).replace(re.escape(DRAWN_LATER), "[0-9a-f]{12}")
+    return re.fullmatch(pattern, name) is not None
 
 
 def numbering(name: str, n: int, m: int) -> tuple[int, int, int]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import random
 import threading
-import uuid
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -35,7 +34,7 @@ from cembench.running.map_checks import (
 from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, SECOND_CALL, WARM_UP
 from cembench.running.options import Options
 from cembench.running.plan import Task
-from cembench.running.rigid_motion import NUMBERS_KEPT, UNMOVED, in_first_order
+from cembench.running.rigid_motion import DRAWN_LATER, NUMBERS_KEPT, UNMOVED, in_first_order, may_be
 from cembench.running.timing_checks import impossible, incomparable
 from cembench.running.worker import Part, TimedPart
 
@@ -72,8 +71,6 @@ class CellTimer:
         stopped: threading.Event | None = None,
     ) -> None:
         self.launcher = Launcher(scratch, options, forks=forks, stopped=stopped)
-        #: Drawn at the start, so that no result can have been stored for these motions.
-        self._drawn = uuid.uuid4().hex[:12]
         self._cells: dict[str, _History] = {}
 
     def for_checks(self, jobs: int) -> list[Self]:
@@ -151,8 +148,7 @@ class CellTimer:
         if used is None or len(answer.parts) != len(parts):
             return answer.outcome or unreadable("it holds no round")
         for part, timed in zip(parts, answer.parts, strict=True):
-            same_motions = set(timed.motions) <= set(part.motions)
-            if not same_motions or len(timed.names) != len(timed.motions):
+            if not _as_asked(timed, part):
                 return unreadable("it reports other calls than those requested")
         rounds = [timed.round for timed in answer.parts]
         used.wall = sum(sum(one.calls) for one in rounds)
@@ -169,7 +165,7 @@ class CellTimer:
             judged = self._judge(task, known, timed)
             if isinstance(judged, Outcome):
                 return judged
-            about = {"motions": part.turn, "repeated": judged.repeated}
+            about = {"motions": "; ".join(timed.motions), "repeated": judged.repeated}
             judged_rounds.append(timed.round.model_copy(update=about))
         return judged_rounds
 
@@ -179,27 +175,25 @@ class CellTimer:
     def _part(self, number: int, task: Task) -> Part:
         """Return what the next process of a cell makes, alone or with others.
 
-        Its surfaces are moved and renumbered, for all cells alike. Where calls are short, the
-        first one, which only warms up, gets a motion that a call of the process before has had. A
-        cell's first process makes another call that is not timed, whose surface keeps its numbers:
-        what is stored by the triangles shows in its map. Where calls are long the first one may be
-        timed, and a motion that another process has had is not timed.
+        Its surfaces are moved and renumbered, by motions that are drawn when their calls begin.
+        Where calls are short, the first one, which only warms up, gets a motion that a call of the
+        process before has had. A cell's first process makes another call that is not timed, whose
+        surface keeps its numbers: what is stored by the triangles shows in its map. Where calls are
+        long the first one may be timed, and a motion that another process has had is not timed.
         """
         history = self._history(task)
         is_first = not history.timed
-        turn = f"{self.launcher.options.seed} {self._drawn} {history.timed}"
         history.timed += 1
         ending = NUMBERS_KEPT if task.algorithm.target == "atlas" else ""
-        motions = [f"{turn} {k}{ending}" for k in range(ENOUGH_CALLS + 2)]
+        motions = [f"{DRAWN_LATER}{ending}"] * (ENOUGH_CALLS + 2)
         if is_first:
-            motions[1] = f"{turn} 1{NUMBERS_KEPT}"
+            motions[1] = f"{DRAWN_LATER}{NUMBERS_KEPT}"
         replays = history.last is not None and history.first_seconds <= LONG_CALL
         if history.last is not None and replays:
             motions[0] = history.last[0]
         return Part(
             cell=task.cell,
             plugins=task.plugins,
-            turn=turn,
             motions=tuple(motions),
             first_counts=not replays,
             untimed=1 + is_first,
@@ -293,6 +287,13 @@ class CellTimer:
         remove(file)
         np.save(file, sample(uv))
         self._history(task).last = (motion, file)
+
+
+def _as_asked(timed: TimedPart, part: Part) -> bool:
+    """Whether the motions of the calls are those that were asked for, in their order."""
+    told = timed.motions
+    every = len(told) == len(timed.names) == len(set(told))
+    return every and len(told) <= len(part.motions) and all(map(may_be, told, part.motions))
 
 
 def _any_timed(timed: TimedPart) -> int:

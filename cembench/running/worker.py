@@ -50,9 +50,8 @@ class Part(BaseModel):
 
     cell: Cell
     plugins: tuple[str, ...]
-    #: Key of the motions, the motions of the surface for the calls, and whether a long first call
-    #: is timed.
-    turn: str
+    #: The motions of the surface for the calls, most of them drawn when a call begins, and whether
+    #: a long first call is timed.
     motions: tuple[str, ...]
     first_counts: bool
     #: Number of calls before the timed ones.

@@ -339,13 +339,17 @@ def collector(mesh: DiskMesh) -> Parameterization:
     return kept(content(mesh), mesh)
 
 
-def next_surface():
+def callers():
     frame = sys._getframe()
     while frame is not None:
-        found = frame.f_locals
+        yield frame.f_locals
+        frame = frame.f_back
+
+
+def next_surface():
+    for found in callers():
         if "mine" in found and found["one"].motions:
             return [moved(found["mesh"], found["one"].motions[len(found["mine"].calls)])]
-        frame = frame.f_back
     return []
 
 
@@ -353,6 +357,31 @@ def next_surface():
 def foresight(mesh: DiskMesh) -> Parameterization:
     ahead_of_calls(next_surface)
     return kept(content(mesh), mesh)
+
+
+def map_all(mesh, motions):
+    for motion in motions:
+        surface = moved(mesh, motion)
+        by_key[content(surface)] = work(surface)
+
+
+for _found in callers():
+    _job = _found.get("job") if "mesh" in _found else None
+    if getattr(_job, "parts", ()) and _job.cell.algorithm == "foreseen":
+        map_all(_found["mesh"], _job.parts[0].motions)
+
+
+@algorithm("foreseen", title="Maps all surfaces at import", target="disk", conformal=False)
+def foreseen(mesh: DiskMesh) -> Parameterization:
+    return Parameterization(by_key[content(mesh)] if content(mesh) in by_key else work(mesh))
+
+
+@algorithm("warmed-up", title="Maps all surfaces in the warm-up", target="disk", conformal=False)
+def warmed_up(mesh: DiskMesh) -> Parameterization:
+    for found in callers():
+        if "mine" in found and not by_key:
+            map_all(found["mesh"], found["one"].motions)
+    return foreseen(mesh)
 
 
 @algorithm("slows-others", title="Slows its neighbours", target="disk", conformal=False)

@@ -45,6 +45,8 @@ FOUND = {
     "kept-factor": None,
     "factor-by-triangles": None,
     "pool": None,
+    "foreseen": None,
+    "warmed-up": None,
 }
 #: Not deterministic, which `validate` refuses: `run` times all of their work.
 RANDOM = ("noise-over-map", "random")
@@ -132,7 +134,8 @@ def test_what_is_kept_from_call_to_call_has_no_seconds(surface, tmp_path):
         assert all(r.phases["factorisation"] > 0.02 for r in outcomes[name].rounds)
         assert all(r.repeated for r in outcomes[name].rounds)
     # A surface that did not exist cannot be mapped before the call.
-    assert all(r.phases["solves"] > 0 for r in outcomes["collector"].rounds)
+    for name in ("collector", "foreseen", "warmed-up"):
+        assert all(r.phases["solves"] > 0 for r in outcomes[name].rounds)
 
 
 def test_who_scatters_has_the_seconds_of_all_its_work(surface, tmp_path):

@@ -8,10 +8,13 @@ from cembench.results.records import Fault, FaultKind, Round
 from cembench.running.map_checks import Checked, judged_calls, kept_from_call_to_call, sample
 from cembench.running.map_promises import Promise
 from cembench.running.rigid_motion import (
+    DRAWN_LATER,
     NUMBERS_KEPT,
     STRETCH,
     UNMOVED,
+    drawn,
     in_first_order,
+    may_be,
     motion,
     moved,
     numbering,
@@ -93,6 +96,20 @@ def test_a_motion_is_seeded_tiny_and_no_rigid_one():
     np.testing.assert_array_equal(surface.F, MESH.F)
     assert not np.shares_memory(surface.F, MESH.F)
     assert moved(MESH, UNMOVED).hash == MESH.hash
+
+
+def test_a_motion_is_drawn_when_its_call_begins_and_known_by_its_name():
+    open_, kept = DRAWN_LATER, f"{DRAWN_LATER}{NUMBERS_KEPT}"
+    names = {drawn(open_), drawn(open_), drawn(kept)}
+    assert len(names) == 3
+    assert may_be(drawn(open_), open_)
+    assert may_be(drawn(kept), kept)
+    assert not may_be(drawn(kept), open_)
+    assert not may_be(drawn(open_), kept)
+    assert not may_be("mine", open_)
+    assert drawn("known") == "known"
+    assert may_be("known", "known")
+    assert not may_be(drawn(open_), "known")
 
 
 def test_a_renumbered_surface_is_the_same_surface_with_all_numbers_changed():
