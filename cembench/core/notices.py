@@ -47,6 +47,8 @@ class NoticeKind(StrEnum):
     BETTER_PARAMETERS = "better_parameters"
     #: Timed calls returned a different result than the checked call.
     NOT_DETERMINISTIC = "not_deterministic"
+    #: E_C of the timed maps is more than 1 % above that of the checked one.
+    WORSE_WHEN_TIMED = "worse_when_timed"
     PROCESSES_LEFT = "processes_left"
     #: The first call of a process took much longer than the later ones.
     COLD_FIRST_CALL = "cold_first_call"

@@ -67,6 +67,10 @@ Figure = Annotated[
 NamePart = Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]*$", max_length=128)]
 
 
+#: E_C over area of a timed map may differ by this from that of the checked one: those of a
+#: randomised solver do by less, those of one that stops earlier by more.
+SAME_ENERGY = 1e-6
+
 #: Why a cell that is measured until it is precise got no more rounds: it was precise, the time was
 #: used up, or it had the maximum number of rounds.
 Ended = Literal["precise", "budget", "rounds"]
@@ -250,6 +254,8 @@ class Round(BaseModel):
     #: Whether a call agreed to rounding with another process's call on the same moved surface;
     #: None if nothing was compared.
     repeated: bool | None = None
+    #: The median of E_C over the area of the timed maps; None if it was not compared.
+    energy: Finite | None = None
     #: For an external program, whose `calls` are the wall clock of its process: its seconds on a
     #: small mesh (None if it failed there), and the solve time it printed in each call (empty if
     #: it prints none).
@@ -384,6 +390,15 @@ class Outcome(BaseModel):
         """E_C over the image's area; None if one of them is unknown."""
         energy, area = (self.metrics.get(name) for name in ("conformal_energy", "image_area"))
         return None if energy is None or not area else energy / area
+
+    @property
+    def worse_when_timed(self) -> float:
+        """How many times that of the checked map the E_C of the timed maps is, at least 1."""
+        timed = [r.energy for r in self.rounds if r.energy is not None]
+        checked = self.relative_energy
+        if not timed or checked is None or lower_median(timed) <= checked + SAME_ENERGY:
+            return 1.0
+        return lower_median(timed) / max(checked, SAME_ENERGY)
 
     @property
     def folded_before_repair(self) -> int | None:

@@ -58,6 +58,9 @@ from cembench.running.timing import CellTimer
 from cembench.running.timing_checks import is_cold
 from cembench.running.watcher import Step, Watcher
 
+#: How many times that of the checked map the E_C of timed maps is at least, to be noted.
+WORSE = 1.01
+
 
 def run_tasks(
     tasks: Sequence[Task],
@@ -344,13 +347,13 @@ class _Run:
 
     def _save_measured(self, state: CellState, ended: Ended | None) -> None:
         rounds = tuple(state.rounds[number] for number in sorted(state.rounds))
-        notes = (*state.passed.notes, *_notes(rounds))
+        outcome = state.passed.model_copy(update={"rounds": rounds, "ended": ended})
+        notes = (*outcome.notes, *_notes(outcome))
         why = self.apart.get(circumstances(state.task.cell))
         if why is not None:
             text = f"not compared within one process, which could not be used in {why}"
             notes = (*notes, Notice(NoticeKind.NOT_TOGETHER, text))
-        about = {"rounds": rounds, "notes": notes, "ended": ended}
-        self._save(state, state.passed.model_copy(update=about))
+        self._save(state, outcome.model_copy(update={"notes": notes}))
 
     def _save(self, state: CellState, outcome: Outcome) -> None:
         started = outcome.rounds[0].started_at if outcome.rounds else now()
@@ -359,9 +362,15 @@ class _Run:
         self.recorder.save(state.task, state.record, state.samples.uv())
 
 
-def _notes(rounds: Sequence[Round]) -> tuple[Notice, ...]:
+def _notes(outcome: Outcome) -> tuple[Notice, ...]:
     """Return remarks on what the rounds of a cell show together."""
-    notices = []
+    rounds, notices = outcome.rounds, []
+    if outcome.worse_when_timed > WORSE:
+        text = (
+            f"E_C of the timed maps is {outcome.worse_when_timed:.3g} times that of the map shown: "
+            "the seconds belong to worse maps, of surfaces that are moved and renumbered"
+        )
+        notices.append(Notice(NoticeKind.WORSE_WHEN_TIMED, text))
     differing = [k for k, r in enumerate(rounds, start=1) if r.repeated is False]
     if differing:
         named = ", ".join(map(str, differing))

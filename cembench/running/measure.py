@@ -42,7 +42,7 @@ from cembench.results.records import (
 )
 from cembench.running.external.call import ProgramCalls
 from cembench.running.external.installed import library_version, missing
-from cembench.running.map_checks import judged_check
+from cembench.running.map_checks import SECOND_CALL, WARM_UP, judged_check
 from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.processor import Processor, after_call, before_call
@@ -63,8 +63,6 @@ ENOUGH_SECONDS = 0.3
 ENOUGH_CALLS = 20
 #: A first call longer than this, in seconds, is not repeated: a warm-up saves only tenths of one.
 LONG_CALL = 5.0
-#: Names of first calls that are not timed: the first warms up, a second is for comparison only.
-WARM_UP, SECOND_CALL = "the warm-up", "the second call"
 
 #: In place of a map that is kept elsewhere.
 _NOT_KEPT = np.empty(0, dtype=np.complex128)

@@ -14,7 +14,7 @@ from copy import copy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from time import monotonic
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,15 @@ from cembench.running.estimate import expected_bytes
 from cembench.running.launcher import Launcher, judges_server, mebibytes, remove, unreadable
 from cembench.running.map_checks import (
     SAME_MAP,
+    SECOND_CALL,
+    WARM_UP,
     Checked,
     JudgedCalls,
     difference,
     kept_from_call_to_call,
     sample,
 )
-from cembench.running.measure import ENOUGH_CALLS, LONG_CALL, SECOND_CALL, WARM_UP
+from cembench.running.measure import ENOUGH_CALLS, LONG_CALL
 from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.rigid_motion import DRAWN_LATER, NUMBERS_KEPT, UNMOVED, in_first_order, may_be
@@ -165,7 +167,8 @@ class CellTimer:
             judged = self._judge(task, known, timed)
             if isinstance(judged, Outcome):
                 return judged
-            about = {"motions": "; ".join(timed.motions), "repeated": judged.repeated}
+            about: dict[str, Any] = {"motions": "; ".join(timed.motions)}
+            about |= {"repeated": judged.repeated, "energy": judged.energy}
             judged_rounds.append(timed.round.model_copy(update=about))
         return judged_rounds
 

@@ -304,12 +304,14 @@ def _has_gauge(record: Record) -> bool:
 
 
 def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
+    worse = record.outcome.worse_when_timed  # quality and seconds are those of one map
     if gauge:
-        return _valid(record).get(_GAUGE)
+        energy = _valid(record).get(_GAUGE)
+        return None if energy is None else energy * worse
     energy, area = (_valid(record).get(name) for name in ("conformal_energy", "image_area"))
     if energy is None or not area:
         return None
-    return energy / area if relative else energy
+    return worse * (energy / area if relative else energy)
 
 
 def _energy_ratio(ours: float, theirs: float) -> float:

@@ -50,6 +50,8 @@ FOUND = {
 }
 #: Not deterministic, which `validate` refuses: `run` times all of their work.
 RANDOM = ("noise-over-map", "random")
+#: Its quality is that of the worse maps.
+TWO_FACED = "two-faced"
 #: Found by who is running, or by CPU time.
 BUSY = {
     "eight-threads": FaultKind.MORE_CORES,
@@ -145,6 +147,13 @@ def test_who_scatters_has_the_seconds_of_all_its_work(surface, tmp_path):
         assert of_kind(NoticeKind.NOT_DETERMINISTIC, record.outcome.notes)
         assert all(r.phases["solves"] > 0 for r in record.outcome.rounds)
         assert not is_valid(record)
+
+
+def test_who_makes_a_better_map_of_the_surface_than_of_moved_ones_is_told(surface, tmp_path):
+    record = records([TWO_FACED], surface, tmp_path / "run", repeats=1)[TWO_FACED]
+    assert record.outcome.status == "ok", record.outcome.cause
+    assert record.outcome.worse_when_timed > 1.05
+    assert of_kind(NoticeKind.WORSE_WHEN_TIMED, record.outcome.notes)
 
 
 @pytest.mark.slow

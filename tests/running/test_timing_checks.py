@@ -186,12 +186,21 @@ def test_maps_of_used_processes_may_differ_as_far_as_those_of_fresh_ones(apart, 
     assert (fault is not None and fault.kind is FaultKind.KEPT_RESULT) == is_kept
 
 
+def test_a_map_that_is_far_worse_is_not_the_one_that_was_checked_though_it_is_repeated():
+    worse = FLAT.copy()
+    worse[MESH.interior] *= 0.8
+    result = judged([("a", worse)], {"a": worse})
+    assert (result.faults, [f.kind for f in result.kept]) == ((), [FaultKind.OTHER_ENERGY])
+    assert result.energy > 1e-3
+
+
 def test_a_worse_map_is_doubtful_until_a_fresh_process_has_made_it_too():
     worse = FLAT.copy()
     worse[MESH.interior] *= 0.99
     result = judged([("a", worse)], {UNMOVED: FLAT})
     assert (result.faults, result.doubtful) == ((), "a")
     assert judged([("a", worse)], {"a": worse}).faults == ()
+    assert judged([("a", worse)], {"a": worse}).kept == ()
     kinds = [f.kind for f in judged([("a", worse)], {"a": FLAT}).faults]
     assert kinds == [FaultKind.OTHER_MAP, FaultKind.OTHER_ENERGY]
     assert isinstance(judged([(UNMOVED, worse)]).faults[0], Fault)

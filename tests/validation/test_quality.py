@@ -46,6 +46,18 @@ def test_an_interval_needs_six_surfaces():
     assert sides([]).ratio is None
 
 
+def test_energies_are_those_of_the_timed_maps_where_these_are_worse():
+    def ours(share, **more):
+        rounds = tuple(Round(calls=(1.0,), energy=share * 0.01 / 3.14) for _ in range(3))
+        return record("ours", "s", rounds=rounds, **more)
+
+    cem = record("cem", "s", 0.01)
+    for share, ratio in ((1.5, 1.5), (0.5, 1.0), (1.0001, 1.0)):
+        assert comparison_with([ours(share), cem], "ours", "cem").energy.ratio == pytest.approx(
+            ratio
+        )
+
+
 def test_pairs_are_by_surface_and_only_of_valid_maps():
     records = [record("ours", f"s{k}", 0.008) for k in range(3)]
     records += [record("cem", f"s{k}", 0.01) for k in range(4)]
