@@ -73,7 +73,7 @@ BUDGETS = {
     "conformal": 6_410,
     "registry": 950,
     "results": 4_980,
-    "running": 7_450,
+    "running": 7_460,
     "drawing": 1_500,
     "report": 7_620,
     "validation": 2_310,

@@ -104,6 +104,12 @@ class ForkServer:
                     return answer[1]
         raise ServerGoneError
 
+    def cpu_seconds(self) -> float:
+        """Return the CPU seconds of the last process as the system has them; 0: unknown."""
+        with suppress(ServerGoneError):
+            return (self.ask("cpu") or 0) / 1e6
+        return 0.0
+
     def close(self) -> None:
         """End the server."""
         self._process.kill()
@@ -155,17 +161,18 @@ class _ForkRequest:
 def _serve() -> _ForkRequest:
     """Answer requests on standard input, one per line; return in every forked process."""
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
-    child, code = 0, None
+    child, code, cpu = 0, None, 0
     _say(0, None)
     while line := requests.readline():
         number, request = json.loads(line)
-        if request in ("poll", "wait"):
+        if request in ("poll", "wait", "cpu"):
             if code is None:
-                pid, status = os.waitpid(child, os.WNOHANG if request == "poll" else 0)
+                pid, status, used = os.wait4(child, os.WNOHANG if request == "poll" else 0)
                 code = os.waitstatus_to_exitcode(status) if pid else None
+                cpu = round(1e6 * (used.ru_utime + used.ru_stime))
             if request == "wait":
                 _end_children()
-            _say(number, code)
+            _say(number, cpu if request == "cpu" else code)
             continue
         child, code = os.fork(), None
         if not child:

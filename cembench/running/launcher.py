@@ -13,6 +13,7 @@ import shutil
 import sys
 import threading
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -105,7 +106,8 @@ class Launcher:
             remove(programs)  # of a program that was ended
         if ending.limit is None and ending.code == 0 and answer_file.exists():
             answer = _with_note(_read_answer(answer_file), ending.left)
-            return answer.model_copy(update={"running": ending.running})
+            observed = {"running": ending.running, "cpu_seconds": ending.cpu_seconds}
+            return answer.model_copy(update=observed)
         with suppress(OSError):  # it, or the folder, may be gone
             self.uv_file.unlink()
         outcome = _outcome_of(ending, seconds, self.options.memory_bytes)
@@ -177,7 +179,8 @@ class Launcher:
         path = self._write(job.model_copy(update={"parent": server.pid}))
         with suppress(ServerGoneError):
             start = server.forking(path)
-            return run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
+            end = run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
+            return replace(end, cpu_seconds=server.cpu_seconds())
         return None
 
     def _write(self, job: Job) -> Path:

@@ -12,6 +12,7 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from statistics import median_low
 from typing import Any
 
 import numpy as np
@@ -31,15 +32,7 @@ from cembench.conformal.metrics import (
 )
 from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.results.records import (
-    SAME_ENERGY,
-    Boundary,
-    Fault,
-    FaultKind,
-    Outcome,
-    lower_median,
-    not_ok,
-)
+from cembench.results.records import SAME_ENERGY, Boundary, Fault, FaultKind, Outcome, not_ok
 from cembench.running.map_promises import Promise, faults, remarks
 from cembench.running.quality import quality_notes
 from cembench.running.rigid_motion import UNMOVED, in_first_order, moved
@@ -195,7 +188,7 @@ def judged_calls(
         if wrong:
             message = f"{name} returned a different map from the check"
             return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=message), *wrong))
-    typical = lower_median(energies) if energies else None
+    typical = median_low(energies) if energies else None
     worse = _far_worse(typical, checked.relative_energy)
     return JudgedCalls(kept=worse, doubtful=doubtful, repeated=repeated, apart=far, energy=typical)
 

@@ -63,6 +63,8 @@ class ProcessEnd:
     left: int = 0
     #: Number of running or runnable threads of the tree at each look.
     running: tuple[int, ...] = ()
+    #: CPU seconds of the process and the children it waited for, from the system; 0: unknown.
+    cpu_seconds: float = 0.0
 
     @property
     def how(self) -> str:

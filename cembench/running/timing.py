@@ -157,7 +157,8 @@ class CellTimer:
         used.cold = sum(one.cold_seconds or 0.0 for one in rounds)
         for task, one in zip(tasks, rounds, strict=True):
             self._history(task).first_seconds = one.cold_seconds or one.calls[0]
-        wrong = [fault for one in rounds for fault in impossible(used, one, began, ended)]
+        seen = (began, ended, answer.cpu_seconds)
+        wrong = [fault for one in rounds for fault in impossible(used, one, *seen)]
         wrong = wrong or incomparable(used, answer.running, tasks[0].cell.threads)
         if wrong:
             return not_ok("not_comparable", *wrong)

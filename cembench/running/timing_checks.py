@@ -26,8 +26,9 @@ LEFT, PREPARING = 0.5, 3.0
 #: and more than that share. A program and what starts it run side by side for a moment, which one
 #: look in forty meets; a call of a few hundredths of a second has seven.
 LEAST_CROWDED, CROWDED = 4, 0.2
-#: Tolerated difference between two processes reading the same clock, in seconds.
-CLOCKS_APART = 0.05
+#: Tolerated difference between two processes reading the same clock, in seconds, and CPU seconds
+#: that the system may have beyond those that a process reports, for its end; MORE is their share.
+CLOCKS_APART, ENDING = 0.05, 0.05
 #: A first call is much slower than later ones above this factor and this difference in seconds.
 COLD_TIMES, COLD_SECONDS = 3.0, 0.1
 
@@ -52,6 +53,8 @@ class Used(BaseModel):
     #: Number of later calls before which something else was running, and number of looks.
     disturbed: int = 0
     looked: int = 0
+    #: CPU seconds of the whole process and its children.
+    everything: float = 0.0
     #: Begin and end on the monotonic clock that all processes share.
     began: float = 0.0
     ended: float = 0.0
@@ -106,8 +109,10 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     return reasons
 
 
-def impossible(used: Used, measured: Round, began: float, ended: float) -> list[Fault]:
-    """Return a fault if a process's times contradict its parent's clock."""
+def impossible(
+    used: Used, measured: Round, began: float, ended: float, cpu: float = 0.0
+) -> list[Fault]:
+    """Return a fault if a process's times contradict its parent's clock, or the system's."""
     reported = used.cold + used.wall
     if min(measured.calls) <= 0 or used.cold < 0 or min(used.own, used.others) < 0:
         why = "a call took no time or negative time"
@@ -115,6 +120,8 @@ def impossible(used: Used, measured: Round, began: float, ended: float) -> list[
         why = f"calls of {reported:.3g} s in a process of {used.ended - used.began:.3g} s"
     elif used.began < began - CLOCKS_APART or used.ended > ended + CLOCKS_APART:
         why = "it reports times when it was not running"
+    elif cpu > (1 + MORE) * used.everything + ENDING:
+        why = f"it reports {used.everything:.3g} s of CPU time, and the system {cpu:.3g} s"
     else:
         return []
     return [Fault(kind=FaultKind.IMPOSSIBLE_TIMES, detail=f"its times are impossible: {why}")]

@@ -29,7 +29,7 @@ from cembench.running.map_checks import Checked, JudgedCalls, judged_calls, judg
 from cembench.running.map_promises import Promise
 from cembench.running.measure import Timed, TimedCalls, call_cell, preparing_seconds, timed_together
 from cembench.running.process import die_with_parent, limit_memory
-from cembench.running.processor import keep_orphans
+from cembench.running.processor import after_call, keep_orphans
 from cembench.running.rigid_motion import moved
 from cembench.running.sanitized_result import outcome_of_error
 from cembench.running.timing_checks import Used
@@ -109,6 +109,7 @@ class Answer(BaseModel):
     used: Used | None = None
     #: Observed by the parent; see :class:`~cembench.running.process.ProcessEnd`.
     running: tuple[int, ...] = ()
+    cpu_seconds: float = 0.0
     judged: JudgedCalls | None = None
 
 
@@ -182,6 +183,7 @@ def _time(job: Job) -> Answer:
         np.save(part.uv_file, _maps(timed))
         motions = tuple(call.motion for call in timed.calls)
         parts.append(TimedPart(round=measured, names=tuple(timed.names()), motions=motions))
+    used.everything = after_call().total
     return Answer(parts=tuple(parts), used=used)
 
 

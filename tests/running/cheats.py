@@ -26,6 +26,7 @@ from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
+from cembench.running import processor
 from cembench.running.rigid_motion import moved
 
 #: Where the ones that keep something on disk keep it.
@@ -228,6 +229,22 @@ def shrunk_times(mesh: DiskMesh) -> Parameterization:
 
     if book.__name__ == "book":
         cembench.core.clock._Ledger.book = shrunk
+    return Parameterization(uv)
+
+
+def by_ten(clock):
+    return lambda: clock() / 10
+
+
+@algorithm("slow-clocks", title="All clocks run slow", target="disk", conformal=False)
+def slow_clocks(mesh: DiskMesh) -> Parameterization:
+    if cembench.core.clock.measure.__defaults__ == (time.perf_counter,):
+        cembench.core.clock.measure.__defaults__ = (by_ten(time.perf_counter),)
+        processor.process_time = by_ten(time.process_time)
+        processor.thread_time = by_ten(time.thread_time)
+    end = time.process_time() + 0.05
+    while time.process_time() < end:
+        uv = work(mesh)
     return Parameterization(uv)
 
 

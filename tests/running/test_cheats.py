@@ -46,6 +46,7 @@ FOUND = {
     "factor-by-triangles": None,
     "pool": None,
     "foreseen": None,
+    "slow-clocks": FaultKind.IMPOSSIBLE_TIMES,
     "warmed-up": None,
 }
 #: Not deterministic, which `validate` refuses: `run` times all of their work.

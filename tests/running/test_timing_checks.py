@@ -72,6 +72,13 @@ def test_times_that_cannot_be_are_refused(told, is_refused):
     assert [f.kind for f in faults] == [FaultKind.IMPOSSIBLE_TIMES] * is_refused
 
 
+def test_cpu_seconds_that_the_system_knows_of_and_the_process_does_not_are_refused():
+    used = Used(wall=1.0, cold=1.0, began=101.0, ended=109.0, everything=2.0)
+    for cpu, is_refused in ((0.0, False), (2.2, False), (0.1, False), (3.0, True)):
+        faults = impossible(used, Round(calls=(1.0,)), 100.0, 110.0, cpu)
+        assert [f.kind for f in faults] == [FaultKind.IMPOSSIBLE_TIMES] * is_refused
+
+
 def test_a_first_call_far_above_the_later_ones_is_cold():
     assert is_cold([Round(calls=(0.1,), cold_seconds=0.2)]) is None
     assert is_cold([Round(calls=(0.001,), cold_seconds=0.02)]) is None
