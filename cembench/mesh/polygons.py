@@ -1,94 +1,124 @@
 """Triangulate polygons, including concave ones and ones with collinear corners.
 
-A fan from the first corner is kept if all its triangles lie in the polygon, which always holds for
-convex polygons. The others are triangulated in their best-fitting plane by a constrained Delaunay
-triangulation (GEOS through shapely), which uses every corner and makes no unnecessary flat
-triangles.
+A fan from the first corner is kept where all its triangles lie in the polygon, and so for every
+convex one: the triangles then do not depend on where the vertices lie. A quadrilateral whose fan is
+wrong is cut along its other diagonal. Larger polygons that are not convex are triangulated in their
+best-fitting plane by a constrained Delaunay triangulation (GEOS through shapely), which uses every
+corner, makes no unnecessary flat triangles, and does not depend on which corner comes first.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.blocks import blocks
+
+Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: A triangle of a fan is flat if its area is below this share of the fan's area.
-_FLAT = 1e-9
+#: A triangle is flat if its area is below this share of its polygon's; single precision leaves less
+#: of a corner on a straight side.
+_FLAT = 1e-6
 
 
-def triangulate(V: NDArray[np.float64], polygons: Iterable[Indices]) -> Indices:
+def triangulate(V: Points, corners: Indices, sizes: Indices) -> Indices:
     """Cut polygons into triangles without adding vertices.
 
     Parameters
     ----------
     V : float64 (n, 3)
-        Vertices, all finite.
-    polygons : iterable of int64 (k, c)
-        Blocks of k polygons with c corners each, in order around the polygon; c is at least 3.
+        Vertices.
+    corners : int64 (sum of sizes,)
+        The vertices around each polygon, one polygon after the other.
+    sizes : int64 (k,)
+        Number of corners of each polygon, at least 3.
 
     Returns
     -------
     int64 (m, 3)
-        Triangles in the order of the polygons and with their orientation. A polygon that crosses
-        itself in its plane has no triangulation and is cut into a fan.
+        Triangles in the order of the polygons and with their orientation, as places in `corners`. A
+        polygon that crosses itself in its plane, or is not finite, has no triangulation and is cut
+        into a fan.
 
     """
-    triangles = [np.empty((0, 3), dtype=np.int64)]
-    for block in polygons:
-        fans = _fans(block)
-        for k in np.flatnonzero(~_good(V, fans)):
-            within = _delaunay(V[block[k]])
-            if within is not None:
-                fans[k] = block[k][within]
-        triangles.append(fans.reshape(-1, 3))
-    return np.concatenate(triangles)
+    if (sizes == 3).all():
+        return np.arange(3 * len(sizes)).reshape(-1, 3)
+    start, counts = np.cumsum(sizes) - sizes, sizes - 2
+    first = np.cumsum(counts) - counts
+    triangles = np.empty((counts.sum(), 3), dtype=np.int64)
+    for c in np.unique(sizes).tolist():
+        alike = np.flatnonzero(sizes == c)
+        for block in blocks(len(alike)):
+            begin = start[alike[block], None]
+            within = _of_one_size(V, corners[begin + np.arange(c)])
+            triangles[first[alike[block], None] + np.arange(c - 2)] = begin[:, None] + within
+    return triangles
 
 
-def _fans(block: Indices) -> Indices:
-    """Return the fan of each polygon, (k, c) -> (k, c - 2, 3)."""
-    c = block.shape[1]
-    corners = np.stack([np.zeros(c - 2, int), np.arange(1, c - 1), np.arange(2, c)], axis=1)
-    return block[:, corners]
+def _of_one_size(V: Points, polygons: Indices) -> Indices:
+    """Return the triangles (k, c - 2, 3) of polygons (k, c), as numbers of their corners."""
+    c = polygons.shape[1]
+    fan = np.stack([np.zeros(c - 2, int), np.arange(1, c - 1), np.arange(2, c)], axis=1)
+    triangles = np.tile(fan, (len(polygons), 1, 1))
+    if c == 3:
+        return triangles
+    good = _all_inside(V, polygons, fan)
+    if c == 4:
+        other = (fan + 1) % 4
+        rest = np.flatnonzero(~good)
+        triangles[rest[_all_inside(V, polygons[rest], other)]] = other
+        return triangles
+    turns = (np.arange(c)[:, None] + np.arange(3)) % c
+    for k in np.flatnonzero(~(good & _all_inside(V, polygons, turns))).tolist():
+        triangles[k] = _delaunay(V, polygons[k], fan)
+    return triangles
 
 
-def _good(V: NDArray[np.float64], fans: Indices) -> NDArray[np.bool_]:
-    """Whether every triangle of a fan has an area and the orientation of its polygon."""
-    if fans.shape[1] == 1:
-        return np.ones(len(fans), dtype=bool)
-    P = V[fans]
-    normals = np.cross(P[:, :, 1] - P[:, :, 0], P[:, :, 2] - P[:, :, 0])
-    whole = normals.sum(axis=1)
-    along: NDArray[np.float64] = np.einsum("ktd,kd->kt", normals, whole)
-    return (along > _FLAT * (whole**2).sum(axis=1)[:, None]).all(axis=1)
+def _all_inside(V: Points, polygons: Indices, triangles: Indices) -> NDArray[np.bool_]:
+    """Whether each of these triangles of a polygon has an area and the polygon's orientation."""
+    P = np.ascontiguousarray(V.take(polygons.T, axis=0).transpose(2, 0, 1))
+    with np.errstate(all="ignore"):  # of vertices that no surface can have
+        u, v = (P[:, triangles[:, k]] - P[:, triangles[:, 0]] for k in (1, 2))
+        whole = _newell(P)
+        shares = np.einsum("xtk,xk->tk", np.cross(u, v, axis=0), whole)
+        return np.asarray((shares > _FLAT * (whole**2).sum(axis=0)).all(axis=0))
 
 
-def _delaunay(P: NDArray[np.float64]) -> Indices | None:
-    """Return triangles (c - 2, 3) of one polygon's corners (c, 3); None if it crosses itself."""
+def _newell(P: Points) -> Points:
+    """Return twice the vector areas (3, k) of polygons (3, c, k)."""
+    P = P - P[:, :1]
+    return np.cross(P[:, :-1], P[:, 1:], axis=0).sum(axis=1)
+
+
+def _delaunay(V: Points, polygon: Indices, fan: Indices) -> Indices:
+    """Return triangles (c - 2, 3) of a polygon's corners; the fan if it crosses itself."""
     import shapely  # slow to load, and rarely needed
 
+    start, c = int(polygon.argmin()), len(polygon)
+    P = V[np.roll(polygon, -start)]  # so that rounding is the same whichever corner comes first
+    if not np.isfinite(P).all():
+        return fan
+    P = P / (np.abs(P).max() or 1.0)  # squares of lengths must not overflow
     P = P - P.mean(axis=0)
-    normal = np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0)  # Newell: twice the vector area
+    normal = _newell(P.T[:, :, None])[:, 0]
     if not normal.any():
-        return None
+        return fan
     across = np.linalg.svd(normal[None])[2][1:]
     if np.linalg.det(np.vstack([across, normal])) < 0:
         across = across[::-1]
     flat = P @ across.T
     place = {tuple(point): k for k, point in enumerate(flat.tolist())}
-    polygon = shapely.Polygon(flat)
-    if len(place) < len(P) or not polygon.is_valid:
-        return None
-    pieces = shapely.constrained_delaunay_triangles(polygon).geoms
+    outline = shapely.Polygon(flat)
+    if len(place) < c or not outline.is_valid:
+        return fan
+    pieces = shapely.constrained_delaunay_triangles(outline).geoms
     triangles = np.array(
         [[place[point] for point in piece.exterior.coords[:3]] for piece in pieces], dtype=np.int64
     )
-    if triangles.shape != (len(P) - 2, 3):
-        return None
-    a, b, c = (flat[triangles[:, k]] for k in range(3))
-    u, v = b - a, c - a
+    if triangles.shape != fan.shape:
+        return fan
+    u, v = (flat[triangles[:, k]] - flat[triangles[:, 0]] for k in (1, 2))
     clockwise = u[:, 0] * v[:, 1] < u[:, 1] * v[:, 0]
     triangles[clockwise] = triangles[clockwise, ::-1]
-    return triangles
+    return (triangles + start) % c

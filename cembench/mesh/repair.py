@@ -212,15 +212,18 @@ def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, 
     """Cut the faces whose vertices exist and are finite into triangles."""
     blocks = [faces] if isinstance(faces, np.ndarray) else faces
     blocks = [np.asarray(block, dtype=np.int64) for block in blocks]
+    corners = np.concatenate([np.empty(0, dtype=np.int64), *(block.ravel() for block in blocks)])
+    counts, sides = np.array([block.shape for block in blocks], dtype=np.int64).reshape(-1, 2).T
+    sizes = np.repeat(sides, counts)
+    polygon = np.repeat(np.arange(len(sizes)), sizes)
     finite = np.append(np.isfinite(V).all(axis=1), False)
-    good_blocks = []
-    for block in blocks:
-        inside = (block >= 0) & (block < len(V))
-        good = finite[np.where(inside, block, -1)].all(axis=1)
-        steps[Step.invalid_faces] += int((~good).sum())
-        good_blocks.append(block[good])
-    steps[Step.polygons] = sum(len(block) for block in good_blocks if block.shape[1] > 3)
-    return triangulate(V, good_blocks)
+    inside = (corners >= 0) & (corners < len(V))
+    bad = np.zeros(len(sizes), dtype=bool)
+    bad[polygon[~finite[np.where(inside, corners, -1)]]] = True
+    corners, sizes = corners[~bad[polygon]], sizes[~bad]
+    steps[Step.invalid_faces] = int(bad.sum())
+    steps[Step.polygons] = int((sizes > 3).sum())
+    return corners[triangulate(V, corners, sizes)]
 
 
 def _weld(V: Points, F: Indices, tolerance: float | None, steps: dict[Step, int]) -> Indices:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -17,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
+from cembench.mesh.polygons import triangulate
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -159,21 +161,17 @@ class Soup:
     @property
     def triangles(self) -> Indices:
         """Return the polygons cut into triangles, (m, 3), in order."""
-        return self._cut(self.corners)
+        return self.corners[self._places]
 
     @property
     def uv_triangles(self) -> Indices:
         """Return the texture coordinate of each corner of the triangles, (m, 3)."""
-        return self._cut(self.corners if self.uv_index is None else self.uv_index)
+        return (self.corners if self.uv_index is None else self.uv_index)[self._places]
 
-    def _cut(self, at_corners: Indices) -> Indices:
-        """Return what belongs to the corners of the polygons for those of their triangles."""
-        if (self.sizes == 3).all():
-            return at_corners.reshape(-1, 3)
-        counts = self.sizes - 2
-        first = np.repeat(np.cumsum(self.sizes) - self.sizes, counts)
-        step = np.arange(len(first)) - np.repeat(np.cumsum(counts) - counts, counts)
-        return at_corners[np.stack([first, first + step + 1, first + step + 2], axis=1)]
+    @cached_property
+    def _places(self) -> Indices:
+        """The corners of the triangles, (m, 3), as places in `corners`."""
+        return triangulate(self.V, self.corners, self.sizes)
 
     @property
     def has_seams(self) -> bool:

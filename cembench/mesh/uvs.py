@@ -7,7 +7,6 @@ program was given.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -67,7 +66,7 @@ def read_flat(path: Path) -> Soup:
     V = soup.V
     if np.abs(V[:, 2]).max() > SAME_PLACE * np.ptp(V[:, :2], axis=0).max():
         raise MeshError("its vertices do not lie in the plane z = 0: it is not a flat map")
-    return replace(soup, V=V[:0], uv=complex_of(V[:, :2]))
+    return Soup.of_triangles(V[:0], soup.triangles, complex_of(V[:, :2]), name=soup.name)
 
 
 def uv_of_corners(file: Soup, V: Points, F: Indices) -> Complex:
