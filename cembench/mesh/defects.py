@@ -188,7 +188,7 @@ def located(error: MeshError, path: Path | None) -> MeshError:
     return MeshError(f"{path}: {error}")
 
 
-def _array(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
+def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
     """Return rows of numbers as an array; an error names the first row of another length."""
     try:
         return np.asarray(rows)
@@ -203,6 +203,15 @@ def _array(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
     )
 
 
+def check_finite(what: str, values: NDArray[Any]) -> None:
+    """Raise :class:`MeshError` if values of vertices, one row each, are NaN or infinite."""
+    bad = np.flatnonzero(~np.isfinite(values).reshape(len(values), -1).all(axis=1))
+    if len(bad):
+        raise MeshError(
+            f"{what} NaN or infinite at vertex {some(bad)} (counted from 0); all must be finite."
+        )
+
+
 def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
     """Return vertices (n, 3) and triangles (m, 3) as float64 and int64.
 
@@ -213,7 +222,7 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
         faces.
 
     """
-    points, faces = _array("vertices", V, 3), _array("faces", F, 3)
+    points, faces = array_of("vertices", V, 3), array_of("faces", F, 3)
     if points.dtype.kind in "iu" and faces.dtype.kind == "f" and faces.ndim == 2:
         raise MeshError(
             "the vertices are integers and the faces are not: the arrays are swapped, or the faces "

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
@@ -23,11 +23,11 @@ from cembench.core.extras import Extra
 from cembench.core.loading import TooLargeError
 from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.defects import located
+from cembench.mesh.defects import array_of, check_finite, located
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
 from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
-from cembench.mesh.soup import Soup, Texture
+from cembench.mesh.soup import Complex, Soup, Texture, complex_of
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 M = TypeVar("M", bound=TriangleMesh)
@@ -275,7 +275,7 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
 
 
 def write_mesh(
-    path: str | os.PathLike[str], mesh: TriangleMesh, uv: NDArray[np.complex128] | None = None
+    path: str | os.PathLike[str], mesh: TriangleMesh, uv: ArrayLike | None = None
 ) -> None:
     """Write a surface, with a map as its texture coordinates if one is given.
 
@@ -289,14 +289,15 @@ def write_mesh(
         OBJ, PLY, GLB, VTP or NPZ; without a map also OFF and STL.
     mesh : TriangleMesh
         The surface.
-    uv : complex128 (n,), optional
+    uv : complex (n,) or float (n, 2), optional
         Image of each vertex, written unchanged. :func:`cembench.mesh.unit_square.to_unit_square`
         moves it to the unit square, where engines expect textures.
 
     Raises
     ------
     MeshError
-        The format is unknown or cannot hold UVs (OFF, STL), or the folder cannot be written to.
+        The format is unknown or cannot hold UVs (OFF, STL), `uv` is not one finite value for each
+        vertex, or the folder cannot be written to.
 
     Examples
     --------
@@ -305,7 +306,26 @@ def write_mesh(
     >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
 
     """
-    write_soup(Path(path), Soup.of_triangles(mesh.V, mesh.F, uv, name=mesh.name))
+    path = Path(path)
+    try:
+        z = None if uv is None else _image(uv, mesh.n)
+    except MeshError as error:
+        raise located(error, path) from None
+    write_soup(path, Soup.of_triangles(mesh.V, mesh.F, z, name=mesh.name))
+
+
+def _image(uv: ArrayLike, n: int) -> Complex:
+    """Return the images of n vertices, complex (n,) or real (n, 2), as finite complex numbers."""
+    z = array_of("UVs", uv, 2)
+    if z.shape == (n, 2) and z.dtype.kind in "fiu":
+        z = complex_of(z)
+    if z.shape != (n,) or z.dtype.kind != "c":
+        raise MeshError(
+            f"uv is of type {z.dtype} and shape {z.shape}; allowed is one value for each of the "
+            f"{n} vertices: complex, shape ({n},), or real, shape ({n}, 2)."
+        )
+    check_finite("uv is", z)
+    return z.astype(np.complex128)
 
 
 def write_soup(path: Path, surface: Soup, texture: Texture | None = None) -> None:

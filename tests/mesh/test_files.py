@@ -7,7 +7,7 @@ from scipy.io import savemat
 
 from cembench import MeshError, TriangleMesh
 from cembench.core.notices import NoticeKind
-from cembench.mesh.files import read_mesh, write_mesh
+from cembench.mesh.files import WITH_UV, read_mesh, write_mesh
 from tests import gallery
 from tests.limits import files_of_at_most
 
@@ -109,6 +109,38 @@ def test_ply_keeps_float64_in_every_form(form, tmp_path):
 def test_uvs_only_go_where_they_fit(name, surface, tmp_path):
     with pytest.raises(MeshError, match=r"allowed here: \.obj, \.ply"):
         write_mesh(tmp_path / name, surface, np.zeros(surface.n, complex))
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("suffix", WITH_UV)
+def test_uvs_may_be_two_columns(suffix, surface, tmp_path):
+    """Single precision, lists and integers, too."""
+    z = (surface.V[:, 0] + 1j * surface.V[:, 1]).astype(np.complex64)
+    for k, uv in enumerate((z, np.column_stack([z.real, z.imag]), [[x.real, x.imag] for x in z])):
+        write_mesh(tmp_path / f"{k}{suffix}", surface, uv)
+    assert len({(tmp_path / f"{k}{suffix}").read_bytes() for k in range(3)}) == 1
+    write_mesh(tmp_path / f"a{suffix}", surface, np.zeros((surface.n, 2), int))
+
+
+@pytest.mark.parametrize("suffix", WITH_UV)
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (
+            lambda z: z[:-1],
+            r"complex128 and shape \(330,\); allowed is .* each of the 331 vertices",
+        ),
+        (lambda z: z.real, r"float64 and shape \(331,\)"),
+        (lambda z: z[:, None], r"shape \(331, 1\)"),
+        (lambda z: np.zeros((len(z), 3)), r"shape \(331, 3\)"),
+        (lambda z: [str(x) for x in z], "of type <U"),
+        (lambda z: np.where(np.arange(len(z)) == 7, np.nan, z), "NaN or infinite at vertex 7 "),
+        (lambda z: [[0, 0], [1]] * len(z), "row 1 .* has 1 numbers; allowed is 2 in each"),
+    ],
+)
+def test_other_uvs_are_refused_alike_for_every_format(suffix, change, message, surface, tmp_path):
+    with pytest.raises(MeshError, match=rf"a{suffix}: .*{message}"):
+        write_mesh(tmp_path / f"a{suffix}", surface, change(surface.V[:, 0] + 0j))
     assert not list(tmp_path.iterdir())
 
 
