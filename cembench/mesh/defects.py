@@ -372,11 +372,10 @@ def out_of_scale(V: Points, F: Indices) -> Problem | None:
 
 def duplicates(F: Indices) -> Mask:
     """Whether each triangle has the same three vertices as an earlier one."""
-    import igl
-
-    _, first, _ = igl.unique_simplices(F)
-    extra = np.ones(len(F), dtype=bool)
-    extra[first] = False
+    alike = np.sort(F, axis=1)
+    order = np.lexsort(alike.T)  # stable: the first of equal ones stays first
+    extra = np.zeros(len(F), dtype=bool)
+    extra[order[1:][(alike[order[1:]] == alike[order[:-1]]).all(axis=1)]] = True
     return extra
 
 

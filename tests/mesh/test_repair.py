@@ -6,7 +6,7 @@ from cembench.surfaces.spherical_cap import spherical_cap
 from cembench import DiskMesh, HoledMesh, MeshError, ParameterError, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh import topology
-from cembench.mesh.defects import degenerate
+from cembench.mesh.defects import degenerate, duplicates
 from cembench.mesh.files import read_soup, repaired_soup
 from cembench.mesh.repair import Step, repair
 from tests import gallery
@@ -174,6 +174,14 @@ def test_any_soup_becomes_manifolds(seed):
 def test_options_out_of_range(options, message):
     with pytest.raises(ParameterError, match=message):
         repair(*gallery.torus(), **options)
+
+
+def test_of_duplicate_triangles_the_first_stays():
+    V, F = gallery.flat_rectangle(8, 8)
+    copies = [np.roll(F, k, axis=1)[np.random.default_rng(k).permutation(len(F))] for k in (1, 2)]
+    twice = np.concatenate([F, *copies])
+    assert np.flatnonzero(duplicates(twice)).tolist() == list(range(len(F), 3 * len(F)))
+    assert repair(V, twice).surfaces[0][1].tolist() == repair(V, F).surfaces[0][1].tolist()
 
 
 def test_nothing_left():
