@@ -47,10 +47,21 @@ def test_two_meshes_in_a_file_need_names(disk, tmp_path):
     assert mesh.hash == small.hash
     with pytest.raises(MeshError, match=r"several pairs fit: v1 and f1; v2 and f2.*arrays="):
         read_mesh(tmp_path / "two.mat", TriangleMesh)
-    with pytest.raises(MeshError, match="there is no variable 'v3'"):
+    with pytest.raises(MeshError, match="there is no variable 'v3'; it has: v1, f1, v2, f2"):
         read_mesh(tmp_path / "two.mat", TriangleMesh, arrays=("v3", "f2"))
     with pytest.raises(MeshError, match="index out of range"):
         read_mesh(tmp_path / "two.mat", TriangleMesh, arrays=("v2", "f1"))
+
+
+@pytest.mark.parametrize("save", [np.savez, savemat])
+def test_names_of_what_a_file_does_not_hold_are_answered_with_those_it_holds(save, tmp_path):
+    path = tmp_path / ("a.npz" if save is np.savez else "a.mat")
+    arrays = {"v": np.eye(3), "f": [[1, 2, 3]], "x": np.zeros((2, 2, 2))}
+    save(path, **arrays) if save is np.savez else save(path, arrays)
+    with pytest.raises(MeshError, match=r"no variable 'p'; it has: v, f, x\. Name two"):
+        read_mesh(path, TriangleMesh, arrays=("p", "t"))
+    with pytest.raises(MeshError, match=r"'x' must be real numbers of shape \(rows, 3\)"):
+        read_mesh(path, TriangleMesh, arrays=("x", "f"))
 
 
 def test_flat_vertices_get_a_height_of_0(disk, tmp_path):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,10 @@ _COUNTED_FROM = (1, 0)
 
 
 def soup_of_arrays(
-    found: Mapping[str, NDArray[Any]], asked: tuple[str, str] | None, counted_from: int | None
+    found: Mapping[str, NDArray[Any]],
+    asked: tuple[str, str] | None,
+    counted_from: int | None,
+    names: Sequence[str],
 ) -> Soup:
     """Build a surface from the requested arrays, else from usual names, else from two that fit.
 
@@ -40,6 +43,8 @@ def soup_of_arrays(
         The names of vertices and triangles.
     counted_from : int or None
         Index of the file's first vertex, 1 in MATLAB; None to find out.
+    names : sequence of str
+        The names of all variables of the file.
 
     Raises
     ------
@@ -64,8 +69,11 @@ def soup_of_arrays(
         text = f"the arrays {pair[0]!r} and {pair[1]!r} were used as vertices and triangles"
         notices = (Notice(NoticeKind.ARRAYS_GUESSED, text),)
     for name in pair:
+        if name not in found and name in names:
+            raise MeshError(f"variable {name!r} must be real numbers of shape (rows, 3).")
         if name not in found:
-            raise MeshError(f"there is no variable {name!r}; it has: {_listed(found)}.")
+            held = ", ".join(names) or "none"
+            raise MeshError(f"there is no variable {name!r}; it has: {held}. Name two of these.")
     v, f = found[pair[0]], found[pair[1]]
     if v.shape[1] not in (2, 3) or f.shape[1] != 3:
         raise MeshError(

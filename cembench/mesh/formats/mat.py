@@ -41,20 +41,19 @@ def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False)
     With `uv` only UVs are read.
     """
     content = path.read_bytes()
+    names: list[str] = []
+    wanted = UV_ARRAYS if uv else arrays or ("v", "f")
+
+    def is_wanted(name: str, shape: list[int]) -> bool:
+        names.append(name)
+        return name in wanted
+
     if uv:
-        names: list[str] = []
-
-        def is_uv(name: str, shape: list[int]) -> bool:
-            names.append(name)
-            return name in UV_ARRAYS
-
-        return soup_of_uv(_arrays(content, is_uv), names, 1)
-    if arrays:
-        return soup_of_arrays(_columns(content, lambda name, shape: name in arrays), arrays, 1)
-    columns = _columns(content, lambda name, shape: name in ("v", "f"))
-    if not {"v", "f"} <= set(columns):
+        return soup_of_uv(_arrays(content, is_wanted), names, 1)
+    columns = _columns(content, is_wanted)
+    if not arrays and not {"v", "f"} <= set(columns):
         columns |= _columns(content, lambda name, shape: shape[1:] in ([2], [3]))
-    return soup_of_arrays(columns, None, 1)
+    return soup_of_arrays(columns, arrays, 1, names)
 
 
 def _columns(

@@ -25,11 +25,7 @@ def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False)
     try:
         with zipfile.ZipFile(path) as archive:
             held = [n.removesuffix(".npy") for n in archive.namelist() if n.endswith(".npy")]
-            missing = [name for name in arrays or () if name not in held]
-            if missing:
-                names = ", ".join(held) or "none"
-                raise MeshError(f"there is no variable {missing[0]!r}; it has: {names}.")
-            chosen = [name for name in held if name in UV_ARRAYS] if uv else list(arrays or held)
+            chosen = [n for n in held if n in (UV_ARRAYS if uv else arrays or held)]
             declared = {name: declared_array(archive, name) for name in chosen}
             if not uv:
                 chosen = [
@@ -42,7 +38,7 @@ def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False)
         raise
     except Exception as error:  # the library may raise anything on damaged bytes
         raise damaged(f"it cannot be read as NPZ: {type(error).__name__}: {error}") from None
-    return soup_of_uv(read, held, 0) if uv else soup_of_arrays(read, arrays, None)
+    return soup_of_uv(read, held, 0) if uv else soup_of_arrays(read, arrays, None, held)
 
 
 def write(surface: Soup) -> bytes:
