@@ -114,7 +114,12 @@ def repair(
     soup = soup_of(surface) if path is None else read_soup(path)
     try:
         repaired = repair_arrays(
-            soup.V, soup.polygons, weld=weld, fill_holes=fill_holes, components=components
+            soup.V,
+            soup.corners,
+            soup.sizes,
+            weld=weld,
+            fill_holes=fill_holes,
+            components=components,
         )
         kinds = (TriangleMesh, DiskMesh, HoledMesh)  # every surface is of the first
         soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in repaired.surfaces]

@@ -242,7 +242,7 @@ def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]
 
     """
     try:
-        repaired = repair(soup.V, soup.polygons)
+        repaired = repair(soup.V, soup.corners, soup.sizes)
     except MeshError as error:
         raise located(error, path) from None
     notices = soup.notices + repaired.notices

@@ -27,7 +27,6 @@ The order of the steps; each may rely on the previous ones and undoes none of th
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Literal, Self
@@ -122,7 +121,8 @@ class Repaired:
 
 def repair(
     V: ArrayLike,
-    faces: Indices | Iterable[Indices],
+    faces: ArrayLike,
+    sizes: Indices | None = None,
     *,
     weld: float | None = None,
     fill_holes: int = 0,
@@ -134,8 +134,10 @@ def repair(
     ----------
     V : float (n, 3)
         Vertices; NaN and infinity are allowed.
-    faces : integers (m, 3), or blocks (k, c) of k polygons with c corners each
-        Vertex indices, counted from 0.
+    faces : integers (k, c)
+        Vertex indices, counted from 0; c is 3 for triangles. With `sizes` all in one row.
+    sizes : int64 (k,), optional
+        The number of corners of each polygon, at least 3, where these differ.
     weld : float, optional
         Vertices at most this far apart, in the units of `V`, become one; 0 welds vertices that
         coincide exactly. By default these are welded unless the surface is a disk already.
@@ -170,7 +172,9 @@ def repair(
     _check_options(weld, fill_holes, components)
     steps = dict.fromkeys(Step, 0)
     points = np.array(V, dtype=np.float64).reshape(-1, 3)
-    F = _triangles(points, faces, steps)
+    faces = np.asarray(faces, dtype=np.int64)
+    sizes = np.full(len(faces), faces.shape[-1]) if sizes is None else sizes
+    F = _triangles(points, faces.ravel(), sizes, steps)
     steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all unused vertices
     F = _weld(points, F, weld, steps)
     wrong_scale = out_of_scale(points, F)
@@ -208,13 +212,8 @@ def _check_options(weld: float | None, fill_holes: int, components: str) -> None
         raise ParameterError(f"components={components!r} is unknown; allowed: 'largest', 'all'.")
 
 
-def _triangles(V: Points, faces: Indices | Iterable[Indices], steps: dict[Step, int]) -> Indices:
+def _triangles(V: Points, corners: Indices, sizes: Indices, steps: dict[Step, int]) -> Indices:
     """Cut the faces whose vertices exist and are finite into triangles."""
-    blocks = [faces] if isinstance(faces, np.ndarray) else faces
-    blocks = [np.asarray(block, dtype=np.int64) for block in blocks]
-    corners = np.concatenate([np.empty(0, dtype=np.int64), *(block.ravel() for block in blocks)])
-    counts, sides = np.array([block.shape for block in blocks], dtype=np.int64).reshape(-1, 2).T
-    sizes = np.repeat(sides, counts)
     polygon = np.repeat(np.arange(len(sizes)), sizes)
     finite = np.append(np.isfinite(V).all(axis=1), False)
     inside = (corners >= 0) & (corners < len(V))

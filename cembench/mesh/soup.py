@@ -149,16 +149,6 @@ class Soup:
         return replace(self, V=self.V[used], corners=corners, sizes=self.sizes[first : last + 1])
 
     @property
-    def polygons(self) -> list[Indices]:
-        """Yield the polygons in order, as blocks (k, c) of k consecutive ones with c corners."""
-        ends = np.cumsum(self.sizes)
-        last = np.flatnonzero(np.diff(self.sizes, append=0))
-        blocks = np.split(self.corners, ends[last[:-1]])
-        return [
-            block.reshape(-1, c) for block, c in zip(blocks, self.sizes[last].tolist(), strict=True)
-        ]
-
-    @property
     def triangles(self) -> Indices:
         """Return the polygons cut into triangles, (m, 3), in order."""
         return self.corners[self._places]

@@ -449,15 +449,6 @@ def test_only_ascii_spaces_part_numbers(tmp_path, odd):
         read_soup(file)
 
 
-def test_the_polygons_come_in_blocks_of_one_size_in_order(tmp_path):
-    faces = [[0, 1, 2], [0, 2, 3], [0, 1, 2, 3], [3, 2, 1]]
-    lines = "".join("f " + " ".join(str(k + 1) for k in face) + "\n" for face in faces)
-    (tmp_path / "a.obj").write_text(OBJ + lines)
-    blocks = read_soup(tmp_path / "a.obj").polygons
-    assert [block.shape for block in blocks] == [(2, 3), (1, 4), (1, 3)]
-    assert [face for block in blocks for face in block.tolist()] == faces
-
-
 def test_lines_of_a_text_ply_that_changed_places_are_no_mesh(tmp_path):
     camera = ("element camera 1\nproperty float view\n", "1.5\n")
     rows = OFF.splitlines(keepends=True)
