@@ -28,6 +28,7 @@ from cembench.mesh.defects import (
     Remedy,
     UnusableMeshError,
     as_arrays,
+    check_finite,
     coincident,
     examine,
     some,
@@ -138,8 +139,15 @@ class TriangleMesh:
         """Return the same mesh under another name."""
         return self.trusted(self.V, self.F, printable(name), self.notices)
 
-    def moved(self, V: NDArray[np.float64]) -> Self:
-        """Return the same triangles with other vertex positions (n, 3)."""
+    def moved(self, V: ArrayLike) -> Self:
+        """Return the same triangles with other vertex positions, finite and real (n, 3)."""
+        V, _ = as_arrays(V, self.F)
+        if len(V) != self.n:
+            raise MeshError(
+                f"{len(V)} positions for the {self.n} vertices of {self.name}; allowed is one each."
+            )
+        check_finite("positions are", V)
+        V.setflags(write=False)
         return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod

@@ -34,6 +34,31 @@ def test_a_checked_mesh_is_frozen_and_owns_its_arrays():
         mesh.V = V
 
 
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda V: V[:-1], r"^\d+ positions for the \d+ vertices of mesh; allowed is one each\.$"),
+        (lambda V: V[:, :2], r"shape \(\d+, 2\); allowed is \(n, 3\)"),
+        (lambda V: V * 1j, "of type complex128; allowed are real"),
+        (lambda V: np.where(V > 4, np.inf, V), "positions are NaN or infinite at vertex 5, "),
+    ],
+)
+def test_a_surface_moves_to_finite_positions_of_its_vertices_only(change, message):
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle())
+    with pytest.raises(MeshError, match=message):
+        mesh.moved(change(mesh.V))
+
+
+def test_a_moved_surface_owns_its_positions():
+    mesh = DiskMesh.from_arrays(*gallery.flat_rectangle())
+    there = mesh.V + 1
+    moved = mesh.moved(there)
+    there[:] = 0
+    assert moved.V.tolist() == mesh.moved((mesh.V + 1).tolist()).V.tolist() != there.tolist()
+    with pytest.raises(ValueError, match="read-only"):
+        moved.V[0] = 1
+
+
 def test_types_are_the_contract_s_whatever_comes_in():
     V, F = gallery.flat_rectangle()
     mesh = DiskMesh.from_arrays(V.astype(np.float32), F.astype(np.uint16))
