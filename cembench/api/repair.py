@@ -88,7 +88,8 @@ def repair(
     MeshError
         The file cannot be read, or no surface is left.
     ParameterError
-        `weld` or `fill_holes` is negative, or `components` is neither "largest" nor "all".
+        `weld` or `fill_holes` is negative, `weld` leaves nothing of the surface, or `components` is
+        neither "largest" nor "all".
 
     Examples
     --------

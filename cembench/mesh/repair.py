@@ -154,7 +154,8 @@ def repair(
     Raises
     ------
     ParameterError
-        A tolerance or a number of edges is below 0, or `components` is unknown.
+        A tolerance or a number of edges is below 0, a tolerance welds each triangle to nothing, or
+        `components` is unknown.
     UnusableMeshError
         The coordinates are too large or too small to compute with.
     MeshError
@@ -176,7 +177,7 @@ def repair(
     sizes = np.full(len(faces), faces.shape[-1]) if sizes is None else sizes
     F = _triangles(points, faces.ravel(), sizes, steps)
     steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all unused vertices
-    F = _weld(points, F, weld, steps)
+    given, F = F, _weld(points, F, weld, steps)
     wrong_scale = out_of_scale(points, F)
     if wrong_scale is not None:
         raise UnusableMeshError([wrong_scale])
@@ -185,10 +186,7 @@ def repair(
     steps[Step.duplicate] = int(extra.sum())
     F = F[~extra]
     if not len(F):
-        raise MeshError(
-            "nothing can be repaired: every face is degenerate or has a missing vertex. The file "
-            "is damaged; export it again."
-        )
+        raise _nothing_left(points, given, weld)
     F, origin = _split(points, F, steps)
     points = points[origin]
     F, origin = _orient(F, len(points), steps)
@@ -200,6 +198,21 @@ def repair(
         filled = _fill_holes(points, without_ears, fill_holes, steps)
         surfaces.append(_compact(*filled))
     return Repaired(tuple(surfaces), steps)
+
+
+def _nothing_left(V: Points, F: Indices, weld: float | None) -> MeshError | ParameterError:
+    """Return the error that no triangle is left, and whether the tolerance is the cause."""
+    sides = side_lengths(V, F[~degenerate(V, F)])
+    if weld and len(sides):
+        return ParameterError.about(
+            f"{{weld:{weld!r}}} leaves nothing: at this tolerance every triangle has corners that "
+            f"become one. The shortest side has the length {sides.min():.3g}, the longest "
+            f"{sides.max():.3g}; give a tolerance well below most sides."
+        )
+    return MeshError(
+        "nothing can be repaired: every face is degenerate or has a missing vertex. The file is "
+        "damaged; export it again."
+    )
 
 
 def _check_options(weld: float | None, fill_holes: int, components: str) -> None:
@@ -227,6 +240,8 @@ def _triangles(V: Points, corners: Indices, sizes: Indices, steps: dict[Step, in
 
 def _weld(V: Points, F: Indices, tolerance: float | None, steps: dict[Step, int]) -> Indices:
     """Replace coincident vertices in the triangles by one of them; the others become isolated."""
+    if tolerance and not (side_lengths(V, F) > tolerance).any():
+        return F[:0]  # soon told, where the pairs of vertices would fill memory
     used, compact = np.unique(F, return_inverse=True)
     first = used[representatives(V[used], tolerance or 0.0)]
     if tolerance is None and (first != used).any() and _is_disk(V[used], compact.reshape(-1, 3)):

@@ -184,6 +184,19 @@ def test_of_duplicate_triangles_the_first_stays():
     assert repair(V, twice).surfaces[0][1].tolist() == repair(V, F).surfaces[0][1].tolist()
 
 
+@pytest.mark.parametrize("weld", [1.2, 100.0])
+def test_a_tolerance_that_leaves_nothing_is_named_as_the_cause(weld):
+    V, F = gallery.flat_rectangle()
+    with pytest.raises(
+        ParameterError, match=rf"^weld={weld} leaves .* 1, the longest 1\.41; give"
+    ) as no:
+        repair(V, F, weld=weld)
+    no.value.reword({})
+    assert str(no.value).startswith(f"--weld {weld} leaves nothing")
+    with pytest.raises(MeshError, match="damaged"):
+        repair(V, F[:, [0, 0, 1]], weld=weld)
+
+
 def test_nothing_left():
     with pytest.raises(MeshError, match="nothing can be repaired"):
         repair(np.zeros((3, 3)), np.array([[0, 1, 2]]))
