@@ -78,9 +78,9 @@ def is_named_like_a_mesh(path: Path) -> bool:
 
 
 def mesh_names(folder: Path) -> list[str]:
-    """Return the names in a folder that are those of mesh files; none if it cannot be listed."""
+    """Return the names of the mesh files in a folder; none if it cannot be listed."""
     try:
-        return sorted(path.name for path in folder.iterdir() if is_named_like_a_mesh(path))
+        return sorted(p.name for p in folder.iterdir() if is_named_like_a_mesh(p) and p.is_file())
     except OSError:
         return []
 
