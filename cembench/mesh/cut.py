@@ -88,13 +88,15 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
     pieces = components(mesh.F, mesh.n)
     if pieces is not None:
         raise UnusableMeshError([pieces])
-    for vertex in through:
-        if not 0 <= vertex < mesh.n:
+    named = np.atleast_1d(np.asarray(through, dtype=object)).tolist()
+    for vertex in named:
+        if not (isinstance(vertex, int | np.integer) and 0 <= vertex < mesh.n):
             raise ParameterError(
-                f"vertex {vertex} is not in {mesh.name}; allowed is 0 to {mesh.n - 1}."
+                f"there is no vertex {vertex} in {mesh.name}; allowed are whole numbers from 0 to "
+                f"{mesh.n - 1}."
             )
     net = _Net.of(mesh)
-    points = list(dict.fromkeys(through))
+    points = list(dict.fromkeys(named))
     if net.is_sphere and len(points) < 2:
         points = net.far_points(points, 2)
     marks = frozenset(points)

@@ -108,8 +108,21 @@ def test_what_cannot_be_cut():
     with pytest.raises(UnusableMeshError) as refused:
         cut_open(surface(gallery.two_pieces()))
     assert [p.defect for p in refused.value.problems] == [Defect.components]
-    with pytest.raises(ParameterError, match="vertex 999 is not in mesh; allowed is 0 to 95"):
+    with pytest.raises(ParameterError, match=r"no vertex 999 in mesh; allowed .* from 0 to 95\."):
         cut_open(surface(gallery.torus()), (0, 999))
+
+
+@pytest.mark.parametrize(
+    ("through", "first"), [([1.5, 2], "1.5"), ("ab", "ab"), ([[1, 2], [3]], r"\[1, 2\]")]
+)
+def test_what_are_no_numbers_of_vertices(through, first):
+    with pytest.raises(ParameterError, match=f"no vertex {first} in mesh; allowed are whole"):
+        cut_open(surface(gallery.torus()), through)
+
+
+def test_numbers_of_vertices_may_come_as_an_array():
+    mesh = surface(gallery.torus())
+    assert cut_open(mesh, np.array([3, 50])).length == cut_open(mesh, [3, 50]).length
 
 
 @pytest.mark.parametrize(
