@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface_family
+from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
 
@@ -23,7 +23,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex
 
 @surface_family("cone", title="Cone", source="closed form", exact_map=exact_map)
 def cone(
-    faces: Annotated[int, Field(ge=24)] = 20_000,
+    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 20_000,
     *,
     angle: Annotated[float, Field(gt=0, lt=90)] = 30.0,
 ) -> DiskMesh:

@@ -8,14 +8,14 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface_family
+from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
 
 
 @surface_family("flat-disk", title="Flat disk", source="closed form")
 def flat_disk(
-    faces: Annotated[int, Field(ge=24)] = 5_000,
+    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 5_000,
     *,
     stretch: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
 ) -> DiskMesh:

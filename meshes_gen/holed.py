@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import surface_family
+from cembench.registry import MOST_FACES, surface_family
 
 from .cache import cached
 from .faces import HO, face_body, mask
@@ -55,7 +55,7 @@ def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
     "holed-cap", title="Spherical cap with holes", source="closed form", exact_map=exact_map
 )
 def holed_cap(
-    faces: Annotated[int, Field(ge=2_000, le=4_000_000)] = 20_000,
+    faces: Annotated[int, Field(ge=2_000, le=MOST_FACES)] = 20_000,
     *,
     holes: Annotated[int, Field(ge=1, le=8)] = 3,
 ) -> HoledMesh:
@@ -82,7 +82,7 @@ def holed_cap(
     "ho-face-with-holes", title="Ho's Face with Holes", source="procedural stand-in for the model"
 )
 def ho_face_with_holes(
-    faces: Annotated[int, Field(ge=5_000, le=4_000_000)] = 100_000,
+    faces: Annotated[int, Field(ge=5_000, le=MOST_FACES)] = 100_000,
     *,
     seed: Annotated[int, Field(ge=0)] = 0,
 ) -> HoledMesh:

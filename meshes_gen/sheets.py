@@ -15,11 +15,11 @@ from pydantic import Field
 
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
-from cembench.registry import surface_family
+from cembench.registry import MOST_FACES, surface_family
 
 from .rectangle import rectangle_grid, rectangle_to_disk
 
-Faces = Annotated[int, Field(ge=24)]
+Faces = Annotated[int, Field(ge=24, le=MOST_FACES)]
 Complex = NDArray[np.complex128]
 
 

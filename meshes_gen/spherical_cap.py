@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import surface_family
+from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
 
@@ -21,7 +21,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex
 
 @surface_family("spherical-cap", title="Spherical cap", source="closed form", exact_map=exact_map)
 def spherical_cap(
-    faces: Annotated[int, Field(ge=24)] = 20_000,
+    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 20_000,
     *,
     angle: Annotated[float, Field(gt=0, lt=180)] = 90.0,
 ) -> DiskMesh:
