@@ -448,13 +448,14 @@ def components(F: Indices, n: int) -> Problem | None:
     pieces = np.flatnonzero(vertices)
     if len(pieces) == 1:
         return None
-    smallest = pieces[np.argmin(vertices[pieces])]
-    place = int(np.flatnonzero((label == smallest) & _used(F, n))[0])
+    ends = (vertices.argmax(), pieces[::-1][vertices[pieces[::-1]].argmin()])  # of equal ones, too
+    large, small = (np.flatnonzero((label == end) & _used(F, n))[0] for end in ends)
     return Problem(
         Defect.components,
         len(pieces),
-        f"the mesh has {len(pieces)} connected components (the largest with {vertices.max()} of "
-        f"{vertices.sum()} vertices; vertex {place} lies in the smallest); this needs exactly one",
+        f"the mesh has {len(pieces)} connected components (vertex {large} lies in the largest, "
+        f"with {vertices.max()} of {vertices.sum()} vertices, vertex {small} in the smallest); "
+        "this needs exactly one",
     )
 
 

@@ -1,3 +1,5 @@
+import re
+
 import numpy as np
 import pytest
 from cembench.algorithms.harmonic_circle import harmonic_circle
@@ -223,6 +225,21 @@ def test_an_outer_boundary_that_is_not_there(vertex, message):
     assert 320 in mesh.interior
     with pytest.raises(ParameterError, match=rf"outer={vertex}: .*{message}.*longest loops"):
         mesh.outer_and_holes(vertex)
+
+
+@pytest.mark.parametrize("sizes", [(3, 3), (3, 4), (4, 3), (4, 3, 4), (3, 4, 3)])
+def test_of_several_components_a_vertex_of_two_is_named_equal_or_not(sizes):
+    parts = [gallery.flat_rectangle(k, k) for k in sizes]
+    starts = np.cumsum([0, *(len(V) for V, _ in parts)])
+    V = np.concatenate([V + k for k, (V, _) in enumerate(parts)])
+    F = np.concatenate([F + k for (_, F), k in zip(parts, starts, strict=False)])
+    with pytest.raises(UnusableMeshError, match="connected components") as no:
+        DiskMesh.from_arrays(V, F)
+    pattern = r"vertex (\d+) lies in the largest, with (\d+) of \d+ vertices, vertex (\d+) in"
+    large, most, small = map(int, re.search(pattern, str(no.value)).groups())
+    of = np.searchsorted(starts, [large, small], side="right") - 1
+    assert of[0] != of[1]
+    assert [len(parts[k][0]) for k in of] == [most, min(len(V) for V, _ in parts)]
 
 
 @pytest.mark.parametrize(("scale", "count"), [(1e200, 29), (1e300, 29), (1e-200, 40), (1e-310, 40)])
