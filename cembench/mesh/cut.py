@@ -110,8 +110,8 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
         )
     F, origin = net.cut(graph)
     message = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
-    notice = Notice(NoticeKind.CUT_OPEN, message)
-    disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=(*mesh.notices, notice))
+    notices = mesh.notices + ((Notice(NoticeKind.CUT_OPEN, message),) if graph else ())
+    disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=notices)
     edges = net.edges[np.array(sorted(graph), dtype=np.int64)]
     return Cut(disk, origin, edges, net.length(graph))
 

@@ -102,6 +102,7 @@ def test_a_disk_needs_no_cut():
     cut = cut_open(mesh)
     check(mesh, cut)
     assert len(cut.edges) == 0
+    assert NoticeKind.CUT_OPEN not in {notice.kind for notice in cut.mesh.notices}
 
 
 def test_what_cannot_be_cut():
