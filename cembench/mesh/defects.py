@@ -190,6 +190,11 @@ def located(error: MeshError, path: Path | None) -> MeshError:
 
 def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
     """Return rows of numbers as an array; an error names the first row of another length."""
+    if np.ma.is_masked(rows):
+        raise MeshError(
+            f"the {what} are an array of which a mask hides numbers; allowed are arrays without a "
+            "mask. Leave these rows out, or write .filled(value)."
+        )
     try:
         return np.asarray(rows)
     except ValueError:
@@ -311,8 +316,7 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
 
 def degenerate(V: Points, F: Indices) -> Mask:
     """Whether each triangle has no area, up to rounding."""
-    flat: Mask = relative_areas(V, F) <= DEGENERATE_AREA
-    return flat
+    return np.asarray(relative_areas(V, F) <= DEGENERATE_AREA)
 
 
 def relative_areas(V: Points, F: Indices) -> Points:

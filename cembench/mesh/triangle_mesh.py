@@ -143,9 +143,7 @@ class TriangleMesh:
         """Return the same triangles with other vertex positions, finite and real (n, 3)."""
         V, _ = as_arrays(V, self.F)
         if len(V) != self.n:
-            raise MeshError(
-                f"{len(V)} positions for the {self.n} vertices of {self.name}; allowed is one each."
-            )
+            raise MeshError(f"{len(V)} positions for {self.n} vertices; allowed is one each.")
         check_finite("positions are", V)
         V.setflags(write=False)
         return self.trusted(V, self.F, self.name, self.notices)

@@ -39,7 +39,7 @@ def test_a_checked_mesh_is_frozen_and_owns_its_arrays():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda V: V[:-1], r"^\d+ positions for the \d+ vertices of mesh; allowed is one each\.$"),
+        (lambda V: V[:-1], r"^\d+ positions for \d+ vertices; allowed is one each\.$"),
         (lambda V: V[:, :2], r"shape \(\d+, 2\); allowed is \(n, 3\)"),
         (lambda V: V * 1j, "of type complex128; allowed are real"),
         (lambda V: np.where(V > 4, np.inf, V), "positions are NaN or infinite at vertex 5, "),
@@ -225,6 +225,15 @@ def test_an_outer_boundary_that_is_not_there(vertex, message):
     assert 320 in mesh.interior
     with pytest.raises(ParameterError, match=rf"outer={vertex}: .*{message}.*longest loops"):
         mesh.outer_and_holes(vertex)
+
+
+def test_a_mask_is_refused_where_it_hides_something():
+    V, F = gallery.flat_rectangle()
+    with pytest.raises(MeshError, match="the vertices are an array of which a mask"):
+        DiskMesh.from_arrays(np.ma.masked_less(V, 0.5)[-3:], F)
+    with pytest.raises(MeshError, match="the faces are an array of which a mask"):
+        DiskMesh.from_arrays(V, np.ma.masked_equal(F, F.max()))
+    assert DiskMesh.from_arrays(np.ma.array(V), F).n == len(V)
 
 
 @pytest.mark.parametrize("sizes", [(3, 3), (3, 4), (4, 3), (4, 3, 4), (3, 4, 3)])
