@@ -80,15 +80,10 @@ def _all_inside(V: Points, polygons: Indices, triangles: Indices) -> NDArray[np.
     P = np.ascontiguousarray(V.take(polygons.T, axis=0).transpose(2, 0, 1))
     with np.errstate(all="ignore"):  # of vertices that no surface can have
         u, v = (P[:, triangles[:, k]] - P[:, triangles[:, 0]] for k in (1, 2))
-        whole = _newell(P)
+        rays = P[:, 1:] - P[:, :1]
+        whole = np.cross(rays[:, :-1], rays[:, 1:], axis=0).sum(axis=1)  # Newell: twice the area
         shares = np.einsum("xtk,xk->tk", np.cross(u, v, axis=0), whole)
         return np.asarray((shares > _FLAT * (whole**2).sum(axis=0)).all(axis=0))
-
-
-def _newell(P: Points) -> Points:
-    """Return twice the vector areas (3, k) of polygons (3, c, k)."""
-    P = P - P[:, :1]
-    return np.cross(P[:, :-1], P[:, 1:], axis=0).sum(axis=1)
 
 
 def _delaunay(V: Points, polygon: Indices, fan: Indices) -> Indices:
@@ -101,7 +96,7 @@ def _delaunay(V: Points, polygon: Indices, fan: Indices) -> Indices:
         return fan
     P = P / (np.abs(P).max() or 1.0)  # squares of lengths must not overflow
     P = P - P.mean(axis=0)
-    normal = _newell(P.T[:, :, None])[:, 0]
+    normal = np.cross(P, np.roll(P, -1, axis=0)).sum(axis=0)
     if not normal.any():
         return fan
     across = np.linalg.svd(normal[None])[2][1:]

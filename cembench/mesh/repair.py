@@ -1,28 +1,7 @@
 """Repair a triangle soup until it is an oriented manifold, and report every step.
 
-The order of the steps; each may rely on the previous ones and undoes none of them:
-
-1. *Faces with a missing or non-finite vertex* are dropped: nothing can be computed with them.
-2. *Polygons* are cut into triangles, which needs finite coordinates.
-3. *Coincident vertices* are welded. That closes seams, and makes some triangles degenerate and
-   others equal. The seam of a surface that is a disk already is a cut: it stays open by default.
-4. *Degenerate triangles* are collapsed (two corners nearly coincide), flipped with their neighbour
-   over the longest edge (three corners on a line: dropping such a triangle would leave a crack), or
-   dropped if they have no neighbour there.
-5. *Duplicate triangles*: of those with the same three vertices, the first is kept.
-6. *Non-manifold edges and vertices* are split. At an edge with more than two triangles, the two
-   that continue each other most smoothly stay connected, so a fin is separated and the sheet under
-   it stays whole.
-7. *Orientation*: all triangles of a piece as most of them are, and closed pieces outwards. A
-   one-sided surface is cut where its triangles contradict each other. This follows the splitting,
-   which decides what the pieces are.
-8. *Components*: the one with most triangles is kept, or all of them as separate surfaces. Fins and
-   fragments that were separated before are dropped here.
-9. *Ears*, triangles with two sides on the boundary, whose tip has no interior neighbour, are
-   dropped until there are none.
-10. *Holes* with at most a given number of edges are filled, if requested; the longest loop stays
-    open.
-11. *Isolated vertices* are removed last, whatever isolated them.
+The steps are made in the order of :class:`Step`; each may rely on the previous ones and undoes none
+of them. docs/repair.md says what each does, and why it comes where it does.
 """
 
 from __future__ import annotations
@@ -292,8 +271,7 @@ def _without(F: Indices, bad: NDArray[np.bool_]) -> tuple[Indices, int]:
 
 def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
     """Whether each triangle has a vertex twice."""
-    twice: NDArray[np.bool_] = (np.roll(F, 1, axis=1) == F).any(axis=1)
-    return twice
+    return np.asarray((np.roll(F, 1, axis=1) == F).any(axis=1))
 
 
 def _half_edge_lengths(V: Points, F: Indices) -> Points:
