@@ -173,9 +173,8 @@ def repair(
     F = _outwards(points, F, steps)
     surfaces = []
     for piece in _components(F, len(points), components, steps):
-        without_ears = _drop_ears(piece, len(points), steps)
-        filled = _fill_holes(points, without_ears, fill_holes, steps)
-        surfaces.append(_compact(*filled))
+        own = _compact(points, _drop_ears(piece, steps))
+        surfaces.append(_fill_holes(*own, fill_holes, steps))
     return Repaired(tuple(surfaces), steps)
 
 
@@ -422,7 +421,7 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
     return [by_piece[k] for k in order]
 
 
-def _drop_ears(F: Indices, n: int, steps: dict[Step, int]) -> Indices:
+def _drop_ears(F: Indices, steps: dict[Step, int]) -> Indices:
     """Drop triangles with two sides on the boundary until there are none.
 
     A surface that would vanish, such as a strip of triangles, is kept as it is.
