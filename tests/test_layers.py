@@ -72,14 +72,14 @@ BUDGETS = {
     "linear_algebra": 1_540,
     "conformal": 6_410,
     "registry": 950,
-    "results": 4_980,
+    "results": 5_000,
     "running": 7_460,
     "drawing": 1_500,
     "report": 7_620,
     "validation": 2_310,
     "morphing": 1_350,
     "api": 5_050,
-    "commands": 2_905,
+    "commands": 2_920,
 }
 
 

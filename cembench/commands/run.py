@@ -31,6 +31,7 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
     The exit code is 1 if a record or a map no longer agrees with its recorded
     figures.
     """
+    from cembench.results.comparison import latest
     from cembench.results.stability import scatter_words, stability_words
     from cembench.results.store import Store
     from cembench.results.verify import Depth, Kind
@@ -62,8 +63,9 @@ def status(run: Run = DEFAULT_RUN, *, verify: Verify = False, as_json: Json = Fa
         ],
     }
     about["machines"] = machines_of(store, verified.records)
-    about["stability"] = stability_words(verified.records)
-    about["scatter"] = scatter_words(verified.records)
+    counted = latest(verified.records)
+    about["superseded"] = len(verified.records) - len(counted)
+    about["stability"], about["scatter"] = stability_words(counted), scatter_words(counted)
     if as_json:
         print_json(about)
     else:
@@ -81,6 +83,8 @@ def _show_status(
         out.print(f"{count:>6}  {state}", style=status_style(state) if state == "ok" else "")
     if others:
         out.print(f"{len(others):>6}  other records, not part of the last request")
+    if about["superseded"]:
+        out.print(f"{about['superseded']:>6}  older records of cells measured again")
     _show_machines(about["machines"])
     for words in (about["stability"], about["scatter"]):
         if words:
@@ -198,7 +202,7 @@ def compare(
     from cembench.results.multiple_testing import corrected
     from cembench.results.runs_compared import compare_runs
 
-    (old, earlier), (new, later) = (_compared(folder, verify) for folder in (before, after))
+    (old, earlier, older), (new, later, more) = (_compared(one, verify) for one in (before, after))
     changes = compare_runs(old, new)
     if not changes:
         raise RecordError(
@@ -222,9 +226,11 @@ def compare(
             }
             for c, both in zip(changes, together, strict=True)
         ]
-        print_json({"differences": differing, "cells": rows})
+        print_json({"differences": differing, "superseded": [older, more], "cells": rows})
     else:
         out.print(changes_table(changes))
+    if older + more:
+        note(f"left out: {older + more} older records of cells measured again")
     if differing:
         warn("the runs were measured under different conditions; their seconds are not comparable")
         for difference in differing:
@@ -235,18 +241,21 @@ def compare(
 
 def _compared(
     folder: Path, verify: bool
-) -> tuple[list[dict[str, Any]], Mapping[str, Mapping[str, Any]]]:
-    """Return the rows of a run or a report, and the run's environments."""
+) -> tuple[list[dict[str, Any]], Mapping[str, Mapping[str, Any]], int]:
+    """Return the rows of a run or a report, the run's environments, and how many it leaves out."""
     from cembench.results.columns import rows
+    from cembench.results.comparison import latest
     from cembench.results.report_records import has_records, read_rows
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 
     if has_records(folder):
-        return read_rows(folder), {}
+        return read_rows(folder), {}, 0
     store = Store(folder)
     records = sound_records(store, Depth.everything if verify else Depth.records)
-    return rows(records), store.environments()
+    kept = {record.cell.key for record in latest(records)}
+    compared = [row for row in rows(records) if row["key"] in kept]
+    return compared, store.environments(), len(records) - len(compared)
 
 
 @app.command(epilog="Example:  cembench merge results/a results/b -o results/both")

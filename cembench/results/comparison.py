@@ -248,6 +248,18 @@ def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
     return {circumstances(record.cell): record for record in own}
 
 
+def latest(records: Sequence[Record]) -> list[Record]:
+    """Drop records that differ only in code or rounds; ok ones are preferred, then later ones."""
+    best: dict[str, Record] = {}
+    ranked = sorted(records, key=lambda r: (r.outcome.status == "ok", r.started_at), reverse=True)
+    for record in ranked:
+        cell = record.cell
+        same = f"{cell.algorithm} {sorted(cell.parameters.items())} {circumstances(cell)}"
+        best.setdefault(same, record)
+    kept = {record.cell.key for record in best.values()}
+    return [record for record in records if record.cell.key in kept]
+
+
 def circumstances(cell: Cell) -> str:
     """Return a text that two cells share if their times are comparable."""
     return f"{cell.mesh_hash} {cell.solves} {cell.backend} {cell.threads}"

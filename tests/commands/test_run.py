@@ -73,6 +73,31 @@ def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
     assert "warning" not in runs("compare", "one", "one")[2]
 
 
+@pytest.fixture
+def edited(runs):
+    """The first run, in which the reference was edited and took half the time from then on."""
+    again = record_of([0.5 * s for s in ROUNDS], algorithm="cem", mesh="hat", code_hash="edited")
+    later = {"environment": "one", "started_at": "2026-02-01T00:00:00+00:00"}
+    Store(runs.folder / "one").save(again.model_copy(update=later), None, {"id": "one"})
+    return runs
+
+
+@pytest.mark.parametrize("pair", [("one", "one"), ("one", "two"), ("two", "one")])
+def test_compare_takes_the_latest_record_of_an_edited_algorithm(edited, pair):
+    code, _, err = edited("compare", *pair)
+    assert (code, f"left out: {pair.count('one')} older records of cells" in err) == (0, True)
+    found = json.loads(edited("compare", *pair, "--json")[1])
+    assert [cell["ratio"] for cell in found["cells"]] == [1, 1]
+    assert found["superseded"] == [int(name == "one") for name in pair]
+
+
+def test_status_does_not_count_what_was_measured_again(edited):
+    code, out, _ = edited("status", "one")
+    assert code == 0
+    assert "1  older records of cells measured again" in out
+    assert "2 of 2 times are unstable" in out
+
+
 def test_merge_brings_runs_together(runs):
     code, out, err = runs("merge", "one", "two", "-o", "all")
     assert code == 0

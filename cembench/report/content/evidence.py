@@ -20,7 +20,7 @@ from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
-from cembench.results.comparison import Comparison, compare
+from cembench.results.comparison import Comparison, compare, latest
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import Paper, papers, usual_paper
@@ -116,7 +116,7 @@ class Evidence:
                 f"{run} holds no record: no cell is finished yet. `cembench status {run}` "
                 "shows what was requested; run the same `cembench run` again to resume it."
             )
-        kept = _latest(records)
+        kept = latest(records)
         exhibits = tuple(read_exhibits(run))
         older = {record.cell.key for record in records} - {record.cell.key for record in kept}
         evidence = cls(store, tuple(kept), exhibits, frozenset(older), paper)
@@ -497,16 +497,3 @@ def difference(choice: Variant, main: Variant) -> str:
     """Return the parameters of a choice that are not those of the main one."""
     other = [pair for pair in choice if pair not in main] or choice
     return ", ".join(f"{name}={value}" for name, value in other)
-
-
-def _latest(records: Sequence[Record]) -> list[Record]:
-    """Drop records that differ only in code or rounds; ok ones are preferred, then later ones."""
-    best: dict[tuple[str, str, Variant, str], Record] = {}
-    for record in records:
-        cell = record.cell
-        key = (cell.mesh_hash, cell.algorithm, _variant(cell, cell.parameters), cell.solves)
-        rank = (record.outcome.status == "ok", record.started_at)
-        if key not in best or (best[key].outcome.status == "ok", best[key].started_at) < rank:
-            best[key] = record
-    kept = {record.cell.key for record in best.values()}
-    return [record for record in records if record.cell.key in kept]
