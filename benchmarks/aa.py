@@ -21,10 +21,10 @@ from cembench.registry import load_registry
 from cembench.results.comparison import (
     Comparison,
     both_ratios,
-    circumstances,
     compare,
     compare_ratios,
     ratio_interval,
+    reference_of,
     references,
 )
 from cembench.results.intervals import ERROR, LOOKS, share, share_of
@@ -209,8 +209,8 @@ def is_called_different(comparison: Comparison) -> bool:
 def pairs(records: Sequence[Record], name: str, base: str) -> list[tuple[Record, Record]]:
     """Return the records of one algorithm, each with that of the other on the same surface."""
     known = references(records, base)
-    chosen = [r for r in records if r.cell.algorithm == name]
-    return [(r, known[circumstances(r.cell)]) for r in chosen if circumstances(r.cell) in known]
+    chosen = [(r, reference_of(r, known)) for r in records if r.cell.algorithm == name]
+    return [(record, base) for record, base in chosen if base is not None]
 
 
 def _counted(tables: Sequence[Sequence[Comparison]]) -> dict[str, Any]:

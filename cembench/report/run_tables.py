@@ -19,12 +19,7 @@ from cembench.report.document import (
     words,
 )
 from cembench.results.columns import marks_explained
-from cembench.results.comparison import (
-    Comparison,
-    circumstances,
-    compare,
-    references,
-)
+from cembench.results.comparison import Comparison, compare, reference_of, references
 from cembench.results.frame import listed
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
@@ -66,7 +61,7 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
     compare.
     """
     known = references(records, reference)
-    bases = [(record, known.get(circumstances(record.cell))) for record in records]
+    bases = [(record, reference_of(record, known)) for record in records]
     compared = [
         (record, comparison)
         for record, base in bases

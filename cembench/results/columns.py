@@ -16,11 +16,11 @@ from cembench.conformal.metrics import METRICS, Metric
 from cembench.core.notices import NoticeKind, of_kind
 from cembench.results.comparison import (
     Comparison,
-    circumstances,
     compare,
     compare_cpu,
     is_unstable,
     paired_ratios,
+    reference_of,
     references,
     seconds_interval,
 )
@@ -381,7 +381,7 @@ def against_reference(
     known = references(records, reference)
     pairs: list[tuple[Record | None, Comparison | None]] = []
     for record in records:
-        base = known.get(circumstances(record.cell))
+        base = reference_of(record, known)
         other = base is not None and base.cell.algorithm != record.cell.algorithm
         pairs.append((base, compare(record, base) if other and base is not None else None))
     return pairs

@@ -16,7 +16,7 @@ so it is wrong no more often. For many comparisons in one table see
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
 from statistics import median
@@ -237,15 +237,31 @@ def verdict_of(interval: Interval | None) -> Verdict:
     return "slower" if interval.low > 1 else "faster"
 
 
-def references(records: Iterable[Record], algorithm: str) -> dict[str, Record]:
+def references(records: Iterable[Record], algorithm: str) -> dict[str, list[Record]]:
     """Return the records of the reference algorithm, by :func:`circumstances`.
 
-    Of several sets of parameters the one of most records counts, the first of two alike.
+    Of several sets of parameters the one of most records counts, the first of two alike; there are
+    several records with it if the code or the number of rounds was changed.
     """
     own = [record for record in records if record.cell.algorithm == algorithm]
     ranked = [how for how, _ in Counter(str(r.cell.parameters) for r in own).most_common()]
-    own.sort(key=lambda record: ranked.index(str(record.cell.parameters)), reverse=True)
-    return {circumstances(record.cell): record for record in own}
+    own.sort(key=lambda record: ranked.index(str(record.cell.parameters)))
+    chosen: dict[str, list[Record]] = {}
+    for record in own:
+        held = chosen.setdefault(circumstances(record.cell), [])
+        if not held or held[0].cell.parameters == record.cell.parameters:
+            held.append(record)
+    return chosen
+
+
+def reference_of(record: Record, known: Mapping[str, Sequence[Record]]) -> Record | None:
+    """Return the one of the :func:`references` that was measured beside a record, or the latest."""
+
+    def rank(base: Record) -> tuple[int, bool, str]:
+        beside = len(_pairs(record.outcome.rounds, base.outcome.rounds))
+        return beside, base.outcome.status == "ok", base.started_at
+
+    return max(known.get(circumstances(record.cell), ()), key=rank, default=None)
 
 
 def latest(records: Sequence[Record]) -> list[Record]:

@@ -8,6 +8,7 @@ from cembench.results.comparison import (
     compare_cpu,
     compare_ratios,
     is_unstable,
+    reference_of,
     references,
 )
 from cembench.results.machines import COMPARED, differences
@@ -201,6 +202,21 @@ def test_the_reference_is_the_one_whose_parameters_most_cells_have():
         for how, place in ((usual, "a"), (usual, "b"), (other, "b"))
     ]
     chosen = references(records, "cem")
-    assert [one.cell.parameters for one in chosen.values()] == [usual, usual]
-    assert references([records[2]], "cem")[circumstances(records[2].cell)] is records[2]
-    assert [one is records[1] for one in references(records[1:], "cem").values()] == [True]
+    assert list(chosen.values()) == [[records[0]], [records[1]]]
+    assert references([records[2]], "cem")[circumstances(records[2].cell)] == [records[2]]
+    assert list(references(records[1:], "cem").values()) == [[records[1]]]
+
+
+def test_a_row_is_compared_with_the_reference_of_its_own_sitting():
+    def sitting(name, rounds, algorithm):
+        record = record_of([1.0] * rounds, [name] * rounds, algorithm=algorithm, repeats=rounds)
+        return record.model_copy(update={"started_at": name})
+
+    run = [sitting(s, n, a) for a in ("cem", "mine") for s, n in (("1", 6), ("2", 7))]
+    for records in (run, run[::-1]):
+        said = {(r["algorithm"], r["rounds"]): r["verdict"] for r in rows(records)}
+        assert said["mine", 6] == said["mine", 7] == "undecided"
+    again = sitting("1", 6, "cem").model_copy(update={"started_at": "3"})
+    apart = sitting("4", 6, "mine")
+    for record, base in ((run[2], again), (run[3], run[1]), (apart, again)):
+        assert reference_of(record, references([*run[:2], again], "cem")) is base
