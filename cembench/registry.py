@@ -871,6 +871,7 @@ def _import_file(path: Path) -> ModuleType:
     """Import a Python file as a module."""
     if not path.is_file():
         raise RegistryError(f"plug-in {str(path)!r}: there is no such file.")
+    _search_last(path.parent)
     name = f"cembench_plugin_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None
@@ -887,8 +888,15 @@ def _import_file(path: Path) -> ModuleType:
 
 
 def _import_module(module: str, plugin: str) -> ModuleType:
+    _search_last(Path())
     with _importing(plugin):
         return importlib.import_module(module)
+
+
+def _search_last(folder: Path) -> None:
+    """Let plug-ins import from a folder what is installed nowhere."""
+    if (place := str(folder.absolute())) not in sys.path:
+        sys.path.append(place)
 
 
 @contextmanager

@@ -57,7 +57,7 @@ class ForkServer:
         self.backend = backend
         self._asked = 0
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "cembench.running.fork_server", str(os.getpid()), backend],
+            [sys.executable, "-P", "-m", "cembench.running.fork_server", str(os.getpid()), backend],
             bufsize=0,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -141,7 +141,7 @@ class Launcher:
         self.scratch.chmod(0o700)
 
     def _started(self, job: Job, limits: Limits, log: Path) -> ProcessEnd:
-        command = [sys.executable, "-m", "cembench.running.worker", str(self._write(job))]
+        command = [sys.executable, "-P", "-m", "cembench.running.worker", str(self._write(job))]
         start = spawning(command, for_measuring(job.cell.threads))
         return run_limited(start, limits, log, stopped=self.stopped.is_set)
 

@@ -44,7 +44,7 @@ def _try(plugin: str, seconds: float) -> None:
     """Load a plug-in in a separate process."""
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
         answer = Path(folder) / "answer"
-        command = [sys.executable, "-m", "cembench.running.plugins", plugin, str(answer)]
+        command = [sys.executable, "-P", "-m", "cembench.running.plugins", plugin, str(answer)]
         start = spawning([*command, str(os.getpid())], os.environ)
         ending = run_limited(start, Limits(seconds), Path(folder) / "log")
         said = answer.read_bytes() if answer.is_file() else None

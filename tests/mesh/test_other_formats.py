@@ -172,9 +172,9 @@ def forked_readers(monkeypatch):
 
     def run(command, check, **streams):
         assert set(streams.values()) == {subprocess.DEVNULL}
-        assert command[:3] == [sys.executable, "-m", apart.__name__]
+        assert command[:4] == [sys.executable, "-P", "-m", apart.__name__]
         with Path(os.devnull).open("r+b") as nowhere:
-            code = forked(lambda: apart._main(*command[3:]), [nowhere] * 3)
+            code = forked(lambda: apart._main(*command[4:]), [nowhere] * 3)
         return subprocess.CompletedProcess(command, code)
 
     monkeypatch.setattr(apart.subprocess, "run", run)

@@ -1,13 +1,19 @@
 """What a plug-in does while it is imported ends another process than ours, and is told."""
 
 import os
+import sys
 import textwrap
 
 import pytest
+from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import RegistryError
+from cembench.mesh.files import read_mesh, write_mesh
 from cembench.registry import load_registry
 from cembench.running import environment
+from cembench.results.store import Store
+from cembench.running.local import run_tasks
+from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.plugins import load_with_plugins
 
 GOOD = """
@@ -86,3 +92,49 @@ def test_what_a_plugin_prints_goes_to_standard_error(plugin, capfd):
     out, err = capfd.readouterr()
     assert out == "after\n"
     assert {"la", "lo"} <= set(err.split())
+
+
+@pytest.fixture
+def hiding(tmp_path, monkeypatch):
+    """The current folder has files with the names of modules that cembench needs."""
+    here = tmp_path / "here"
+    here.mkdir()
+    for name in ("queue", "numpy", "trimesh"):
+        (here / f"{name}.py").write_text("raise ImportError('hidden')")
+    monkeypatch.chdir(here)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    yield here
+    for name in ("beside_a_plugin", "named_plugin"):
+        sys.modules.pop(name, None)
+
+
+NEIGHBOUR = """
+    from beside_a_plugin import NUMBER
+
+    @algorithm("ours", title="Ours", target="free boundary")
+    def ours(mesh: DiskMesh) -> Parameterization:
+        return Parameterization(mesh.V[:, 0] + NUMBER * mesh.V[:, 1])
+"""
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_files_of_the_current_folder_hide_no_library(plugin, hiding, tmp_path, threads):
+    (tmp_path / "beside_a_plugin.py").write_text("NUMBER = 1j")
+    path = plugin(NEIGHBOUR)
+    ours = load_with_plugins([path]).algorithm("ours")
+    settings = MeasurementSettings(repeats=1, threads=threads)
+    tasks = plan_cells([ours], [flat_disk(100)], {}, settings, [path])
+    (record,) = run_tasks(tasks, Store(tmp_path / "run"))
+    assert record.outcome.status == "ok", record.outcome.cause
+
+
+def test_a_module_of_the_current_folder_is_a_plugin(plugin, hiding):
+    plugin("", hiding / "named_plugin.py")
+    assert load_with_plugins(["named_plugin:mine"]).algorithm("mine").title == "Mine"
+
+
+@pytest.mark.usefixtures("hiding")
+def test_a_library_that_reads_a_file_is_not_hidden(tmp_path):
+    pytest.importorskip("trimesh")
+    write_mesh(tmp_path / "a.glb", flat_disk(100))
+    assert read_mesh(tmp_path / "a.glb").n == flat_disk(100).n

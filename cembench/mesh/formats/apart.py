@@ -44,9 +44,10 @@ def apart(reader: Reader, extra: Extra, module: str) -> Reader:
         require(extra, f"reading {path.suffix} files", module)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            call = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            reads = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            command = [sys.executable, "-P", "-m", __name__, *reads]
             nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-            ended = subprocess.run([sys.executable, "-m", __name__, *call], check=False, **nowhere)
+            ended = subprocess.run(command, check=False, **nowhere)
             if (folder / _ERROR).exists():
                 raise MeshError((folder / _ERROR).read_text())
             if ended.returncode == 0:
