@@ -271,8 +271,9 @@ def cheapest(
 ) -> set[str]:
     """Return the cells that reach their first look in the remaining seconds, the cheapest first.
 
-    Parameters are those of :func:`affordable`; a cell's partner is measured with it. With
-    `surfaces`, the surface of each cell, the cheapest surfaces come first, each with all its cells.
+    Parameters are those of :func:`affordable`; a cell's partner is measured with it, and not alone:
+    it would be compared with nothing. With `surfaces`, the surface of each cell, the cheapest
+    surfaces come first, each with all its cells.
     """
     chosen: set[str] = set()
     groups: dict[str, list[str]] = {}
@@ -289,7 +290,8 @@ def cheapest(
     def price_beside(label: str) -> float:
         return sum(costs[one] for one in {label, partners.get(label, label)})
 
-    ordered = sorted(costs.keys() - chosen, key=lambda label: (price_beside(label), label))
+    compared = costs.keys() - chosen - set(partners.values())
+    ordered = sorted(compared, key=lambda label: (price_beside(label), label))
     return chosen | _within(ordered, costs, partners, seconds)
 
 
