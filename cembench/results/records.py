@@ -508,9 +508,12 @@ def signed(record: Record) -> bytes:
     return text.encode()
 
 
-def is_as_written(content: Mapping[str, Any]) -> bool:
-    """Whether a record's JSON still matches its digest."""
-    return bool(content.get("digest") == digest(content))
+def altered(content: Mapping[str, Any]) -> str:
+    """Return what shows that a record's JSON is not as it was written; "" if nothing does."""
+    if "digest" not in content:
+        return "has no digest, which each record is written with"
+    as_written = content["digest"] == digest(content)
+    return "" if as_written else "was changed after it was written: its digest differs"
 
 
 def digest(content: Mapping[str, Any]) -> str:

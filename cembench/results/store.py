@@ -45,7 +45,15 @@ from cembench.core.atomic import (
 )
 from cembench.core.errors import RecordError
 from cembench.core.folders import is_empty_file
-from cembench.core.loading import damaged, files_in, is_there, read_arrays, read_bytes, read_json
+from cembench.core.loading import (
+    REMEDY,
+    damaged,
+    files_in,
+    is_there,
+    read_arrays,
+    read_bytes,
+    read_json,
+)
 from cembench.core.names import file_name
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results import run_folder
@@ -54,7 +62,7 @@ from cembench.results.records import (
     Cell,
     Environment,
     Record,
-    is_as_written,
+    altered,
     signed,
 )
 from cembench.results.samples import Samples, read_map
@@ -79,11 +87,8 @@ class Store:
         if path is None:
             return None
         record = read_record(path)
-        if not is_as_written(json.loads(read_bytes(path, self.folder))):
-            raise RecordError(
-                f"{path} was changed after it was written: its digest differs. Delete it and run "
-                "again."
-            )
+        if how := altered(json.loads(read_bytes(path, self.folder))):
+            raise RecordError(f"{path} {how}. {REMEDY}")
         return record
 
     def rename(self, record: Record, cell: Cell, *, keep: bool) -> Record:

@@ -24,7 +24,7 @@ from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import RecordError
 from cembench.core.loading import read_bytes
 from cembench.core.wording import Advice
-from cembench.results.records import Record, is_as_written
+from cembench.results.records import Record, altered
 from cembench.results.store import Store, read_record
 
 #: Maximum total triangles of a sample's maps; the sample has at least one map.
@@ -123,7 +123,7 @@ def _refusal(store: Store, found: Sequence[Finding]) -> RecordError:
     named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
     more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
     return RecordError.about(
-        "{folder} cannot be used: its records or maps were changed after measuring.\n"
+        "{folder} cannot be used: its records or maps are not as they were written.\n"
         "{named}{more}\nDelete these files and run again, or restore them. {everything} compares "
         "everything.",
         folder=store.folder,
@@ -137,8 +137,8 @@ def _refusal(store: Store, found: Sequence[Finding]) -> RecordError:
 
 def verify_record(file: Path, record: Record) -> Iterator[Finding]:
     """Compare a record with its digest, its file's name and its own status."""
-    if not is_as_written(json.loads(read_bytes(file, file.parents[1]))):
-        yield Finding(file, Kind.digest, "was changed after it was written: its digest differs")
+    if how := altered(json.loads(read_bytes(file, file.parents[1]))):
+        yield Finding(file, Kind.digest, how)
     if not file.stem.endswith(f"--{record.cell.key[:12]}"):
         yield Finding(
             file,

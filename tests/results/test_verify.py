@@ -179,6 +179,19 @@ def test_a_run_does_not_go_on_from_an_edited_record(store):
             store.find(cell)
 
 
+def test_a_record_without_a_digest_is_refused_and_not_called_changed(store, cli):
+    edit(file_of(store), lambda content: content.pop("digest"))
+    cell = next(r.cell for r in store.records() if r.cell.algorithm == "cem")
+    with pytest.raises(RecordError, match=r"--cem--.* has no digest") as caught:
+        store.find(cell)
+    assert "changed" not in str(caught.value)
+    for command in (["status", "run"], ["export", "run"], ["show", "a/cem", "--run", "run"]):
+        code, _, err = cli(*command)
+        assert code
+        assert "has no digest" in err
+        assert "changed" not in err
+
+
 def test_merge_into_a_run_that_was_edited_is_refused_and_changes_nothing(store, cli):
     write_pair(cli.folder / "other")
     edit(file_of(store), lower_energy)
