@@ -72,7 +72,7 @@ BUDGETS = {
     "linear_algebra": 1_540,
     "conformal": 6_410,
     "registry": 950,
-    "results": 5_000,
+    "results": 5_010,
     "running": 7_460,
     "drawing": 1_500,
     "report": 7_620,

@@ -52,7 +52,8 @@ class Recorder:
 
         A record follows its mesh to another name, unless the old one is `asked` for too.
         """
-        stored = self.store.find(task.cell)
+        # A damaged record stops a run, but not one that makes it anew.
+        stored = None if self.options.fresh else self.store.find(task.cell)
         if stored is not None or self.options.fresh:
             self.store.forget_samples(task.cell)
         if stored is None or self.options.measures_again(stored):

@@ -10,6 +10,7 @@ import psutil
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
+from cembench.core.errors import RecordError
 from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import load_registry
@@ -238,6 +239,18 @@ def test_what_is_in_the_store_is_not_measured_again(tmp_path):
     _, noted = run(tasks_of("good", solves="backslash"))
     assert noted.kept == [False]
     assert len(store.records()) == 3
+
+
+@pytest.mark.parametrize("change", [lambda text: text[:200], lambda text: text.replace("ok", "no")])
+def test_a_fresh_run_replaces_damaged_records(tmp_path, change):
+    store, (task,) = Store(tmp_path / "run"), tasks_of("good")
+    run_tasks([task], store)
+    file = store.record_file(task.cell)
+    file.write_text(change(file.read_text()))
+    with pytest.raises(RecordError, match="Delete it and run again"):
+        run_tasks([task], store)
+    (record,) = run_tasks([task], store, Options(fresh=True))
+    assert run_tasks([task], store) == store.records() == [record]
 
 
 def test_rounds_go_over_all_cells_in_turn(tmp_path):

@@ -26,6 +26,7 @@ from cembench.results.intervals import next_look
 from cembench.results.machines import differences
 from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.results.store import Store
+from cembench.results.verify import Depth, verify
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
 from cembench.running.cluster.worker import Answer, describe_worker, forget, measure_unit
@@ -166,7 +167,7 @@ class _ClusterRun:
         if options.fresh or options.rerun_failed:
             token += self.topic  # unfinished units of earlier runs are not resumed
         known: dict[str, list[Record]] = {}
-        for record in self.recorder.store.finished():
+        for record in verify(self.recorder.store, Depth.records).records:
             known.setdefault(record.cell.algorithm, []).append(record)
         groups = grouped(pending)
         costs = [
