@@ -130,7 +130,7 @@ def _end_of(error: Exception) -> NoReturn:
     trace = "".join(traceback.format_exception(error))
     if isinstance(error, OSError):
         where = f"{os.fspath(error.filename)!r}: " if error.filename is not None else ""
-        message = f"{where}{error.strerror or error}. The operating system refused the access."
+        message = f"{where}{error.strerror or error}. {_advice(error)}"
         code = SYSTEM
     else:
         message = f"internal error in cembench: {type(error).__name__}: {error}. "
@@ -141,6 +141,16 @@ def _end_of(error: Exception) -> NoReturn:
         with suppress(OSError):
             sys.stderr.write(trace)
     sys.exit(code)
+
+
+def _advice(error: OSError) -> str:
+    from cembench.core.atomic import FREE_SPACE, FULL
+
+    if error.errno in FULL:
+        return FREE_SPACE
+    if isinstance(error, FileNotFoundError):
+        return "It, or a folder above it, is gone; run the same command again."
+    return "The operating system refused the access."
 
 
 def _kept(trace: str) -> str:

@@ -30,7 +30,8 @@ _DRAFT = re.compile(r"\.draft-([0-9a-f]{12})-(\d+)-[0-9a-f]{32}(\.\w+)?")
 #: The bits of a file's mode that say who may read, write and execute it.
 _PERMISSIONS = 0o777
 #: Error codes of a full disk or quota: another folder on the same disk would not help.
-_FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+FREE_SPACE = "Free some space, or choose a path on another disk."
 
 
 def read_model(path: Path, model: type[M], root: Path | None = None) -> M:
@@ -168,11 +169,7 @@ def unwritable(
     path: Path, error: OSError, kind: type[CembenchError] = RecordError
 ) -> CembenchError:
     """Return the error for a file that could not be written."""
-    remedy = (
-        "Free some space, or choose a path on another disk."
-        if error.errno in _FULL
-        else "Choose another path."
-    )
+    remedy = FREE_SPACE if error.errno in FULL else "Choose another path."
     return kind(f"{path} cannot be written: {error.strerror or error}. {remedy}")
 
 

@@ -8,6 +8,7 @@ an algorithm. Nothing that a process leaves is trusted: not its answer, its map,
 from __future__ import annotations
 
 import atexit
+import io
 import os
 import shutil
 import sys
@@ -185,8 +186,7 @@ class Launcher:
 
     def _write(self, job: Job) -> Path:
         path = self.scratch / "job.json"
-        remove(path)
-        path.write_text(job.model_dump_json())
+        _put(path, job.model_dump_json().encode())
         return path
 
     def _mesh_files(self, task: Task) -> tuple[Path, Path]:
@@ -195,8 +195,7 @@ class Launcher:
         files = self.scratch / f"{stem}-V.npy", self.scratch / f"{stem}-F.npy"
         for file, array in zip(files, (task.mesh.V, task.mesh.F), strict=True):
             if not file.exists() or _stamp(file) != self._written.get(file):
-                remove(file)
-                np.save(file, array)
+                save_array(file, array)
                 self._written[file] = _stamp(file)
         return files
 
@@ -220,6 +219,30 @@ def remove(path: Path) -> None:
         shutil.rmtree(path)
     else:
         path.unlink(missing_ok=True)
+
+
+def save_array(path: Path, array: NDArray[Any]) -> None:
+    """Write an ``.npy`` file to the scratch folder; numpy's own error does not say why it failed.
+
+    Raises
+    ------
+    OSError
+        It cannot be written; the error has the file's name, and the reason.
+
+    """
+    head, array = io.BytesIO(), np.ascontiguousarray(array)
+    np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))
+    _put(path, head.getvalue(), array.data)
+
+
+def _put(path: Path, *parts: bytes | memoryview) -> None:
+    remove(path)
+    try:
+        with path.open("wb") as file:
+            for part in parts:
+                file.write(part)
+    except OSError as error:
+        raise OSError(error.errno, error.strerror, str(path)) from error
 
 
 def unreadable(why: str) -> Outcome:

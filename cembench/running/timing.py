@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cembench.core.names import file_name
 from cembench.results.records import Fault, FaultKind, Outcome, Round, Status, not_ok
 from cembench.running.estimate import expected_bytes
-from cembench.running.launcher import Launcher, judges_server, mebibytes, remove, unreadable
+from cembench.running.launcher import Launcher, judges_server, mebibytes, save_array, unreadable
 from cembench.running.map_checks import (
     SAME_MAP,
     SECOND_CALL,
@@ -215,8 +215,7 @@ class CellTimer:
             if isinstance(again, Outcome):
                 return again
             row = self.launcher.scratch / f"{file_name(task.cell.label)}-again.npy"
-            remove(row)
-            np.save(row, again)
+            save_array(row, again)
             judged = self._judge_once(task, checked, timed, known | {judged.doubtful: row})
         if isinstance(judged, Outcome):
             return judged
@@ -288,8 +287,7 @@ class CellTimer:
     def _remember(self, task: Task, motion: str, uv: NDArray[np.complex128]) -> None:
         """Store a sample of the map of this motion for the next process of the cell."""
         file = self.launcher.scratch / f"{file_name(task.cell.label)}.npy"
-        remove(file)
-        np.save(file, sample(uv))
+        save_array(file, sample(uv))
         self._history(task).last = (motion, file)
 
 

@@ -1,5 +1,6 @@
 """How the command line ends: pipes, signals, full disks, read-only folders, faults."""
 
+import errno
 import os
 import resource
 import signal
@@ -136,8 +137,26 @@ def test_a_temporary_folder_that_is_full_is_told(tmp_path):
     done = run(["map", "disk.obj", "-a", "cem", "--timeout", 60], tmp_path, preexec_fn=little)
     assert done.returncode == 2
     assert "Traceback" not in done.stderr
-    assert "temporary folder" in done.stderr
+    assert "temporary folder cannot be used: File too large" in done.stderr
     assert "TMPDIR" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOSPC, "No space left on device. Free some space"),
+        (errno.ENOENT, "No such file or directory. It, or a folder above it, is gone"),
+        (errno.EACCES, "Permission denied. The operating system refused the access."),
+    ],
+)
+def test_what_the_system_says_of_a_file_is_told_as_it_is(cli, monkeypatch, number, words):
+    def broken(plugins=()):
+        raise OSError(number, os.strerror(number), "run/scratch-1/a.npy")
+
+    monkeypatch.setattr("cembench.registry.load_registry", broken)
+    code, _, err = cli("list")
+    assert code == SYSTEM
+    assert f"'run/scratch-1/a.npy': {words}" in " ".join(err.split())
 
 
 def test_a_temporary_folder_that_is_not_there_is_told(tmp_path):

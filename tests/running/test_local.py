@@ -24,6 +24,7 @@ from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.schedule import CellState, in_random_order
 from cembench.running.timing import CellTimer
 from cembench.running.watcher import Watcher
+from tests.limits import files_of_at_most
 
 FAULTY = str(Path(__file__).with_name("faulty.py"))
 pytestmark = pytest.mark.usefixtures("kept_servers")
@@ -239,6 +240,17 @@ def test_what_is_in_the_store_is_not_measured_again(tmp_path):
     _, noted = run(tasks_of("good", solves="backslash"))
     assert noted.kept == [False]
     assert len(store.records()) == 3
+
+
+def test_a_full_scratch_folder_is_an_error_that_says_so(tmp_path):
+    (task,) = tasks_of("good", faces=2000)
+    with (
+        files_of_at_most(2**13),
+        pytest.raises(OSError, match="File too large") as caught,
+        closing(CellTimer(tmp_path, Options())) as timer,
+    ):
+        timer.check(task)
+    assert caught.value.filename.endswith("-V.npy")
 
 
 @pytest.mark.parametrize("change", [lambda text: text[:200], lambda text: text.replace("ok", "no")])
