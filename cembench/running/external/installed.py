@@ -30,8 +30,11 @@ def missing(algorithm: Algorithm) -> str | None:
     """Return which dependency of an algorithm is missing and how to install it, or None."""
     program, library = algorithm.program, algorithm.library
     if program is not None and executable(program) is None:
+        name = program.command[0]
         remedy = program.remedy or "Install it, add its folder to PATH, or give its full path"
-        return f"there is no program {program.command[0]!r} on this machine. {remedy}"
+        folder = algorithm.file.parent.absolute() if algorithm.file else Path.cwd()
+        place = f"in {folder}" if _is_relative(name) else "on this machine"
+        return f"there is no program {name!r} {place}. {remedy}"
     if library is not None and importlib.util.find_spec(library.module) is None:
         return (
             f"the library {library.package} is not installed; run `pip install {library.package}`"
@@ -41,8 +44,14 @@ def missing(algorithm: Algorithm) -> str | None:
 
 def executable(program: Program) -> Path | None:
     """Return the executable file of a program's command."""
-    path = shutil.which(program.command[0])
+    name = program.command[0]
+    path = None if _is_relative(name) else shutil.which(name)
     return None if path is None else Path(path)
+
+
+def _is_relative(name: str) -> bool:
+    """Whether a program is named by a relative path: no file was there when it was declared."""
+    return Path(name).name != name and not Path(name).is_absolute()
 
 
 def library_version(library: Library) -> str | None:

@@ -17,6 +17,7 @@ from cembench.results.comparison import compare
 from cembench.results.records import FaultKind, Round
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
+from cembench.running.external.installed import missing
 from cembench.running.local import map_once, run_tasks
 from cembench.running.measure import check_cell
 from cembench.running.options import Options
@@ -93,6 +94,29 @@ def test_a_program_that_is_not_there_is_skipped_with_what_brings_it():
     assert outcome.status == "skipped"
     assert outcome.faults[0].kind is FaultKind.NOT_THERE
     assert "no program 'no-such-solver'" in outcome.cause
+
+
+DECLARED = """
+from cembench import DiskMesh, external_program
+
+@external_program("mine", title="Mine", target="disk", command="./solver {input} {output}")
+def mine(mesh: DiskMesh) -> None:
+    "Map by a program beside this file."
+"""
+
+
+def test_the_program_of_a_declaration_is_looked_for_beside_its_file(tmp_path, monkeypatch):
+    (tmp_path / "sub").mkdir()
+    plugin = tmp_path / "sub/declares.py"
+    plugin.write_text(DECLARED)
+    monkeypatch.chdir(tmp_path)
+    for place, lacks in ((tmp_path, True), (plugin.parent, False)):
+        solver = place / "solver"
+        solver.write_text("#!/bin/sh")
+        solver.chmod(0o700)
+        why = missing(load_registry(["sub/declares.py"]).algorithm("mine"))
+        told = f"there is no program './solver' in {plugin.parent}. Install it"
+        assert why.startswith(told) if lacks else why is None
 
 
 def test_a_hundred_megabytes_of_words_are_dropped():
