@@ -48,8 +48,12 @@ def read_uv(path: Path) -> Soup:
         file = _READERS[path.suffix.lower()](path, uv=True)
     except (OSError, ValueError, OverflowError, IndexError, KeyError) as error:
         raise MeshError(f"{path.name} cannot be read: {describe_error(error)}") from error
-    if file.uv is None or (not len(file.uv) and len(file.V)):
-        raise damaged("it holds no UVs: no line that begins with vt")
+    if file.uv is None or not len(file.uv):
+        obj_words = (
+            ": no line that begins with vt. If it has two numbers a line, declare that with "
+            "`--program output=txt`"
+        )
+        raise damaged(f"it holds no UVs{obj_words if path.suffix.lower() == '.obj' else ''}")
     return file
 
 

@@ -1,5 +1,6 @@
 """A program that maps a flat disk by its own coordinates, or breaks one promise: MODE IN OUT."""
 
+import gzip
 import hashlib
 import os
 import signal
@@ -36,6 +37,15 @@ def main(mode, given, left, *more):
             left = Path(left).with_name("result.obj")
         case "empty":
             Path(left).touch()
+            return
+        case "noise":
+            Path(left).write_bytes(bytes(range(256)) * 100)
+            return
+        case "gzip":
+            Path(left).write_bytes(gzip.compress(Path(given).read_bytes()))
+            return
+        case "text":
+            Path(left).write_text("".join(f"{x!r} {y!r}\n" for x, y in uv))
             return
         case "large":
             Path(left).write_bytes(b"# " + b"x" * 100_000_000)
