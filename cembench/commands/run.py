@@ -164,13 +164,14 @@ def show(
 
 def _show_records(records: list[Record]) -> None:
     from cembench.report.record_table import figures_table
+    from cembench.results.columns import significant
 
     for record in records:
         outcome = record.outcome
         print_pair(outcome.status, f"{record.cell.solves}  {record.cell.key[:12]}")
         out.print(figures_table(record))
         for number, r in enumerate(outcome.rounds, start=1):
-            calls = " ".join(f"{seconds:.4f}" for seconds in r.calls)
+            calls = " ".join(significant(seconds, 4) for seconds in r.calls)
             out.print(f"round {number:<3} {r.started_at}  {calls}")
         for words in (outcome.cause, outcome.traceback):
             if words:

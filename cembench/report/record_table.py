@@ -8,7 +8,7 @@ from typing import Any
 from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
 from cembench.report.declarations import own
 from cembench.report.document import Column, Table
-from cembench.results.columns import COLUMNS, FIGURES, seconds_words
+from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
 from cembench.results.frame import filled, phrase
 from cembench.results.papers import paper_of
 from cembench.results.records import Record
@@ -47,9 +47,9 @@ def _known(record: Record) -> dict[str, Any]:
     errors = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
     return known | {
         "in_the_paper": _printed(record) if record.mesh.paper_row else "",
-        "took": "" if seconds is None else spoken or f"{seconds:.3f} s",
+        "took": "" if seconds is None else spoken or f"{significant(seconds)} s",
         "seconds_words": spoken,
-        "by_phase": ", ".join(f"{name} {spent:.3f}" for name, spent in outcome.phases.items()),
+        "by_phase": ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items()),
         "given": [f"{name}={value}" for name, value in record.cell.parameters.items()],
         "chosen": chosen,
         "tried": [f"{n} {e:.2f}" if type(e) is float else f"{n} none" for n, e in errors.items()],

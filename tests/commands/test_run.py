@@ -73,6 +73,17 @@ def test_compare_tells_what_changed_and_that_the_machines_differ(runs):
     assert "warning" not in runs("compare", "one", "one")[2]
 
 
+def test_show_has_digits_of_short_calls_too(runs):
+    record = record_of([2.15e-4] * 6, algorithm="quick", mesh="hat")
+    (one, *_) = rounds = record.outcome.rounds
+    rounds = (one.model_copy(update={"phases": {"solves": 1.5e-4, "laplacian": 6.5e-5}}),) * 6
+    outcome = record.outcome.model_copy(update={"rounds": rounds})
+    Store(runs.folder / "two").save(record.model_copy(update={"outcome": outcome}), None, {})
+    _, out, _ = runs("show", "hat/quick", "--run", "two")
+    assert "0.000215 (solves 0.000150, laplacian 0.0000650)" in out
+    assert out.count("0.0002150") == 3 + 6
+
+
 @pytest.fixture
 def edited(runs):
     """The first run, in which the reference was edited and took half the time from then on."""
