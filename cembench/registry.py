@@ -911,11 +911,13 @@ def _importing(plugin: str) -> Iterator[None]:
             yield
     except KeyboardInterrupt:
         raise
+    except RegistryError as error:  # a declaration in it is wrong
+        raise RegistryError(f"plug-in {plugin!r}: {error}") from error
     except BaseException as error:
-        raise RegistryError(
-            f"plug-in {plugin!r} cannot be imported: {describe_error(error)}. Repair it: importing "
-            "a plug-in must only declare functions."
-        ) from error
+        what = f"plug-in {plugin!r} cannot be imported: {describe_error(error).removesuffix('.')}"
+        ends = ": importing a plug-in must only declare functions"
+        rule = "" if isinstance(error, Exception) else ends
+        raise RegistryError(f"{what}. Repair it{rule}.") from error
 
 
 @contextmanager

@@ -60,7 +60,7 @@ def _try(plugin: str, seconds: float) -> None:
 def _ending(ending: ProcessEnd, seconds: float) -> str:
     if ending.limit:
         return f"the import took more than {seconds:g} s"
-    return f"the importing process {ending.how}"
+    return f"the importing process {ending.how}".removesuffix(".")
 
 
 def _main(plugin: str, answer: Path, parent: int) -> None:

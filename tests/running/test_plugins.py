@@ -52,6 +52,22 @@ def test_what_ends_the_import_of_a_plugin_is_told(plugin, text, cause):
     assert cause in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("print('Last words.', flush=True); import os; os._exit(3)", "Last words. Repair it: imp"),
+        ("raise ValueError('Not here.')", " cannot be imported: ValueError: Not here. Repair it."),
+        ("algorithm('a', title='A', target='sphere')(mine)", ": algorithm 'a': target 'sphere'"),
+    ],
+)
+def test_what_is_wrong_with_a_plugin_is_told_in_whole_sentences(plugin, text, told):
+    with pytest.raises(RegistryError) as caught:
+        load_with_plugins([plugin(text)])
+    assert told in str(caught.value)
+    assert ".." not in str(caught.value)
+    assert ("declare functions" in str(caught.value)) == ("exit" in text)
+
+
 def test_a_plugin_that_is_never_done_importing_is_told(plugin):
     with pytest.raises(RegistryError, match=r"the import took more than 0\.5 s\. Repair it"):
         load_with_plugins([plugin("while True: pass")], 0.5)
