@@ -446,6 +446,11 @@ def benchmark(
             "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one "
             "of them. {precision} and {max_rounds} choose the rounds within a budget."
         )
+    if rounds is not None and max_rounds != USUAL_MOST_ROUNDS:
+        raise ParameterError.about(
+            "{rounds} fixes the number of rounds, which {max_rounds} limits for {precision}: give "
+            "only one of them."
+        )
     if sets and rounds is None and precision is None:
         rounds = 1
     share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)

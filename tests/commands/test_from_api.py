@@ -170,6 +170,12 @@ def test_the_map_of_a_file_is_that_of_parameterize(cli, cap):
             "--rounds fixes the number of rounds, which --budget does not shorten",
         ),
         (
+            lambda: cembench.benchmark(["flat-disk"], rounds=3, max_rounds=20),
+            ("run", "--surfaces", "flat-disk", "--rounds", 3, "--max-rounds", 20),
+            "`rounds` fixes the number of rounds, which `max_rounds` limits for `precision`",
+            "--rounds fixes the number of rounds, which --max-rounds limits for --precision",
+        ),
+        (
             lambda: cembench.benchmark(["flat-disk"], memory_bytes="much"),
             ("run", "--surfaces", "flat-disk", "--memory", "much"),
             "memory_bytes='much' is not a size",
