@@ -526,6 +526,11 @@ def _signature(
     name: str, function: Callable[..., Any], positional: str | None = None
 ) -> tuple[dict[str, Any], tuple[Parameter, ...]]:
     """Return the type hints of a function, and its keyword parameters."""
+    if not name or "," in name or name != name.strip():
+        raise RegistryError(
+            f"the name {name!r} cannot be chosen: options separate names by commas, and drop "
+            "spaces around them. Give another name."
+        )
     try:
         hints = typing.get_type_hints(_annotated(function), include_extras=True)
         signature = inspect.signature(function)

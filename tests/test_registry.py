@@ -1,4 +1,5 @@
 import textwrap
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -12,7 +13,7 @@ from cembench import (
     registry,
     surface_family,
 )
-from cembench.registry import Algorithm, load_algorithm, load_registry
+from cembench.registry import Algorithm, load_algorithm, load_registry, program_from
 
 GOOD = """
     from typing import Annotated
@@ -107,6 +108,17 @@ def test_a_name_is_declared_once(plugin):
         load_registry([plugin(GOOD.replace('"mine"', '"cem"'))])
     with pytest.raises(RegistryError, match="'mine' is declared twice"):
         load_registry([plugin(GOOD), plugin(GOOD, "other.py")])
+
+
+@pytest.mark.parametrize("name", ["a,b", " a", ""])
+def test_a_name_that_no_option_can_choose_is_refused(plugin, name):
+    with pytest.raises(RegistryError, match=f"the name '{name}' cannot be chosen: options sep"):
+        load_registry([plugin(GOOD.replace('"mine"', f'"{name}"'))])
+    with pytest.raises(RegistryError, match="cannot be chosen"):
+        surface_family(name, title="A")(lambda faces=2: None)
+    if name:
+        with pytest.raises(RegistryError, match="cannot be chosen"):
+            program_from({"command": "a {input} {output}", "name": name}, Path())
 
 
 def test_an_unknown_name_lists_the_known_ones():
