@@ -79,7 +79,7 @@ BUDGETS = {
     "validation": 2_310,
     "morphing": 1_350,
     "api": 5_050,
-    "commands": 2_920,
+    "commands": 2_930,
 }
 
 

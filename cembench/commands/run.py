@@ -286,6 +286,8 @@ def merge(
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 
+    if output.exists() and all(run.exists() and run.samefile(output) for run in runs):
+        raise ParameterError(f"{output} is the only run: name another one to merge into it.")
     refuse_inputs(output, runs, force=force)
     check_signed(runs, require_signed)
     into = Store(output)
