@@ -10,8 +10,8 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench import RegistryError
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.registry import load_registry
-from cembench.running import environment
 from cembench.results.store import Store
+from cembench.running import environment
 from cembench.running.local import run_tasks
 from cembench.running.plan import MeasurementSettings, plan_cells
 from cembench.running.plugins import load_with_plugins

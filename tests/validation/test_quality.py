@@ -1,7 +1,7 @@
 import pytest
 
 from cembench.core.notices import Notice, NoticeKind
-from cembench.results.records import Fault, FaultKind
+from cembench.results.records import Fault, FaultKind, Round
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
