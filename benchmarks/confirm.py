@@ -12,7 +12,7 @@ from benchmarks.origins import hashes, origins, tree_at, write
 from benchmarks.pages import ROOT, Section, Table
 from cembench.results.columns import rows
 from cembench.results.records import REFERENCE
-from cembench.results.report_records import read_rows, text_rows
+from cembench.results.report_records import has_records, read_rows, text_rows
 from cembench.results.runs_compared import Change, compare_runs
 from cembench.results.store import Store
 
@@ -23,7 +23,7 @@ SAME = 10.0 ** (2 - DIGITS)
 
 
 def confirm(report: Path, run: Path, *, reference: str = REFERENCE, command: str = "") -> Section:
-    """Renew the marks of a kept report if a run of the present code agrees with it.
+    """Renew the marks of a kept report or run if a run of the present code agrees with it.
 
         cembench run --surfaces ... -a cem,fdm --budget 22m -o results/second
         python -m benchmarks confirm reports/paper results/second
@@ -34,11 +34,7 @@ def confirm(report: Path, run: Path, *, reference: str = REFERENCE, command: str
     both have the same figures, and no verdict against the reference contradicts the report's.
     `command` is what measured the run.
     """
-    store = Store(run)
-    kept = [
-        row | {name: text[name] or None for name in FIGURES}
-        for row, text in zip(read_rows(report), text_rows(report), strict=True)
-    ]
+    store, kept = Store(run), _kept(report, reference)
     there = rows(store.records(), reference)
     changes = compare_runs(kept, there)
     if len(changes) < LEAST * len(kept):
@@ -73,6 +69,16 @@ def confirm(report: Path, run: Path, *, reference: str = REFERENCE, command: str
 |---|---|---:|---:|---:|
 | {report} | `{commit}` | {cells} | {same_verdict} | {one_decides} |"""
     return Section([Table([{"report": name, **how}], layout)])
+
+
+def _kept(folder: Path, reference: str) -> list[dict[str, Any]]:
+    """Return the rows of a kept report, or of a kept run, with the figures as they are kept."""
+    if not has_records(folder):
+        return rows(Store(folder).records(), reference)
+    return [
+        row | {name: text[name] or None for name in FIGURES}
+        for row, text in zip(read_rows(folder), text_rows(folder), strict=True)
+    ]
 
 
 def _same_map(change: Change) -> bool:

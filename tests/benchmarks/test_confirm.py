@@ -1,6 +1,7 @@
 """A kept report is confirmed by a run that agrees with it, and by no other."""
 
 import json
+import shutil
 
 import pytest
 
@@ -24,9 +25,12 @@ def kept(tmp_path, monkeypatch):
     monkeypatch.setattr(study, "ROOT", tmp_path)
     monkeypatch.setattr(study, "tree_at", lambda commit: origins.working_tree())
 
-    def confirm(**changes):
+    def confirm(*, as_run=False, **changes):
         held = [row | changes for row in rows(run.records(), "cem") if row["seconds_raw"]]
-        export_rows(held, tmp_path / "reports/a/records.csv", Format.csv)
+        if as_run:
+            shutil.copytree(run.folder, tmp_path / "reports/a")
+        else:
+            export_rows(held, tmp_path / "reports/a/records.csv", Format.csv)
         section = study.confirm(tmp_path / "reports/a", run.folder, command="cembench run")
         return section, json.loads(file.read_text())["reports/a"]
 
@@ -40,6 +44,11 @@ def test_a_run_that_agrees_renews_the_marks(kept):
     assert how["commit"] == "1" * 12
     assert how["cells"] > how["same_verdict"] > 0 == how["one_decides"]
     assert f"at `{how['commit']}` by {how['cells']} cells" in stale.confirmed_words(how)
+
+
+def test_a_kept_run_is_confirmed_like_a_report(kept):
+    _, about = kept(as_run=True)
+    assert about["confirmed"]["cells"] >= about["confirmed"]["same_verdict"] > 0
 
 
 def test_another_map_refuses(kept):
