@@ -210,6 +210,8 @@ class MeshFacts(BaseModel):
     #: Who published it, and the object that it shows; "" where unknown, and in older records.
     source: str = ""
     family: str = ""
+    #: The algorithm whose printed energy and angle errors a stand-in was fitted to, if any.
+    fitted: str = ""
 
 
 class Neighbours(BaseModel):

@@ -53,6 +53,8 @@ class Provenance:
     family : str
         The object that it shows. Surfaces of one family, such as scans of one statue, are not
         independent samples; "" if unknown, which makes the surface a family of its own.
+    fitted : str
+        The algorithm whose printed figures the surface was fitted to, if any.
 
     """
 
@@ -60,6 +62,7 @@ class Provenance:
     origin: MeshOrigin = "surface"
     source: str = ""
     family: str = ""
+    fitted: str = ""
 
 
 @dataclass(frozen=True)
@@ -193,6 +196,7 @@ def mesh_facts(mesh: TriangleMesh, standing: Provenance = Provenance()) -> MeshF
         origin=standing.origin,
         source=standing.source,
         family=standing.family,
+        fitted=standing.fitted,
     )
 
 
@@ -232,10 +236,15 @@ def mesh_files(folder: Path) -> list[Path]:
 
 def provenances(registry: Registry, names: Iterable[str]) -> dict[str, Provenance]:
     """Return where these generated surfaces are from: each name is a family of its own."""
-    rows = {name: registry.surface(name).paper_row for name in names}
+    known = map(registry.surface, names)
     return {
-        name: Provenance(row, "stand-in" if row else "surface", family=name)
-        for name, row in rows.items()
+        one.name: Provenance(
+            one.paper_row,
+            "stand-in" if one.paper_row else "surface",
+            family=one.name,
+            fitted=one.fitted,
+        )
+        for one in known
     }
 
 
