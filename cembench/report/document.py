@@ -22,13 +22,17 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 #: Origin of a number; a table never mixes two origins in a column without a mark.
-Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
+Origin = Literal["printed", "model", "stand-in", "fitted", "surface", "derived", ""]
 
 #: Description of each origin, and the mark after its numbers.
 ORIGINS: Mapping[Origin, tuple[str, str]] = {
     "printed": ("printed in the paper", "ᵖ"),
     "model": ("measured here on the paper's own model", "ᵐ"),
     "stand-in": ("measured here on a stand-in for the paper's model", "ˢ"),
+    "fitted": (
+        "measured here on a stand-in that was fitted to this printed figure: it decides nothing",
+        "ᶠ",
+    ),
     "surface": ("measured here on a surface that is not in the paper", ""),
     "derived": ("computed from other figures of this report", ""),
 }
@@ -211,6 +215,30 @@ class Gallery:
 
 
 @dataclass(frozen=True)
+class Judged:
+    """A claim's test on surfaces of one origin, or on the printed figures.
+
+    `on` says on how many of what, `figures` what was found, and `counted` how many tests hold.
+    """
+
+    on: str
+    figures: str
+    verdict: Verdict = "not tested here"
+    counted: str = ""
+
+    @property
+    def counted_verdict(self) -> str:
+        """The verdict with how many tests hold."""
+        return ", ".join(filter(None, (self.verdict, self.counted)))
+
+    @property
+    def sentence(self) -> str:
+        """The verdict and what it rests on."""
+        on, figures = self.on[0].upper() + self.on[1:], self.figures.rstrip(".")
+        return f"{on}: {self.counted_verdict} ({figures})."
+
+
+@dataclass(frozen=True)
 class Claim:
     """A claim of the paper's text with its test.
 
@@ -230,6 +258,9 @@ class Claim:
         What it says in a few words.
     counted : str
         How many tests hold; of tests on surfaces, with the 95 % interval of the share of families.
+    parts : mapping
+        The verdicts apart, by origin of the surfaces, models first; "printed" is a control on the
+        printed tables. `verdict` and `counted` are those of the first.
 
     """
 
@@ -242,6 +273,7 @@ class Claim:
     remark: str = ""
     plain: str = ""
     counted: str = ""
+    parts: Mapping[str, Judged] = field(default_factory=dict)
 
     @property
     def title(self) -> str:

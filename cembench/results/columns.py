@@ -220,6 +220,15 @@ def family_of(record: Record) -> str:
     return record.mesh.family or record.cell.mesh
 
 
+#: Figures to which stand-ins are fitted.
+FITTED = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+
+
+def is_fitted(record: Record) -> bool:
+    """Whether a record's :data:`FITTED` figures are of the fit itself, and so decide nothing."""
+    return record.mesh.fitted == record.cell.algorithm
+
+
 def half_width(record: Record) -> float | None:
     """Return half the width of the 95 % interval of a cell's seconds, in percent of them."""
     interval, seconds = seconds_interval(record), record.outcome.median_seconds
@@ -312,6 +321,7 @@ EXPORTED = (
     _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
     _C("origin", _at("mesh.origin")),
     _C("paper_row", lambda r: r.mesh.paper_row or None),
+    _C("fitted", is_fitted),
     _C("source", lambda r: r.mesh.source or None),
     _C("family", family_of),
     _C("solves", _at("cell.solves"), "solves"),

@@ -190,8 +190,9 @@ class StatedClaim(_Part):
         The result in words, what is said instead without any case, and what follows the remark:
         texts with expressions in braces, in which the values of the cases are columns, and `held`
         and `tested` are numbers.
-    over : str
-        Rows of the surfaces that the remark counts, by default those tested; None: no such remark.
+    on : tuple of {"measured", "printed"}
+        What it is tested on: the run's surfaces, those of each origin apart, and the printed
+        tables, as a control.
 
     """
 
@@ -212,7 +213,7 @@ class StatedClaim(_Part):
     )
     none: str = ""
     further: str = ""
-    over: str = ""
+    on: tuple[Literal["measured", "printed"], ...] = ("measured",)
     remark: str = ""
 
 

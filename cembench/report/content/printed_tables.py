@@ -205,10 +205,11 @@ def measured_rates(evidence: Evidence, algorithm: str, policy: str) -> dict[str,
 
 
 def measured(evidence: Evidence, algorithm: str, policy: str) -> pd.DataFrame:
-    """Return the records of an algorithm on one surface for each model of the paper."""
-    frame = evidence.frame
+    """Return the records of an algorithm on one surface for each model with a printed rate."""
+    frame, paper = evidence.frame, evidence.paper
     rows = frame[frame["counted"] & frame["main"] & (frame["algorithm"] == algorithm)]
-    return rows[rows["solves"] == policy]
+    in_print = [m for m in paper.models if corrected_rate(paper, m, algorithm) is not None]
+    return rows[(rows["solves"] == policy) & rows["model"].isin(in_print)]
 
 
 def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:

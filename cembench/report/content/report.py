@@ -10,7 +10,7 @@ from pathlib import Path
 
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
-from cembench.report.content.claims import at_a_glance, claims
+from cembench.report.content.claims import at_a_glance, claims, in_short
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
 from cembench.report.content.findings import findings, many_findings, surfaces_words
@@ -323,7 +323,7 @@ def _tables(run: _Run) -> Section | None:
 
 def _claims(run: _Run) -> Section:
     tested = claims(run.evidence, run.seen)
-    glance = [at_a_glance(tested)] if tested else []
+    glance = [in_short(tested), at_a_glance(tested)] if tested else []
     return Section("claims", "Claims of the paper", (*glance, *tested))
 
 
