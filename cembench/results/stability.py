@@ -11,6 +11,7 @@ from statistics import median, stdev
 
 from cembench.results.comparison import (
     UNSTABLE_WIDTH,
+    WIDE_RATIO,
     both_ratios,
     circumstances,
     compare,
@@ -176,10 +177,8 @@ def scatter_words(records: Sequence[Record]) -> str:
         sentence += f" between processes and by {median(within):.1%} within one process"
     sentence += f" (medians over {len(separate)} pairs)"
     if widths:
-        unstable = sum(width > UNSTABLE_WIDTH for width in widths)
-        sentence += (
-            f"; {unstable} of {len(widths)} have an interval wider than {UNSTABLE_WIDTH:.0%}"
-        )
+        wide = sum(width > WIDE_RATIO for width in widths)
+        sentence += f"; {wide} of {len(widths)} have an interval wider than {WIDE_RATIO:.0%}"
     return f"{sentence}."
 
 
