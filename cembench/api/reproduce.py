@@ -107,6 +107,7 @@ def reproduce(
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.results.intervals import USUAL_PRECISION
+    from cembench.results.papers import usual_paper
     from cembench.results.profiles import Profile, algorithms_of
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
@@ -129,7 +130,7 @@ def reproduce(
     chosen = [registry.algorithm(name) for name in algorithms_of(Profile.quick, registry)]
     surfaces, roles = _surfaces(registry, chosen, offline, jobs, reporter)
     settings = MeasurementSettings.until_precise(USUAL_PRECISION)
-    tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles)
+    tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles, paper=usual_paper())
     with reporter.watching(len(tasks), options.budget or inf) as progress:
         records = run_tasks(tasks, Store(folder), options, progress)
     run = Run(folder, tuple(records))

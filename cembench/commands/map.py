@@ -60,7 +60,8 @@ def map_(
             if len(maps) > 1 and not verbose:
                 _show_line(mapped, len(maps.done), len(maps))
             else:
-                _show_all(mapped, verbose=verbose, keep_invalid=maps.keep_invalid)
+                output = maps.output is not None
+                _show_all(mapped, output, verbose=verbose, keep_invalid=maps.keep_invalid)
     _print_end(maps, as_json=as_json)
 
 
@@ -92,17 +93,20 @@ def _more_of(mapped: Mapped) -> dict[str, Any]:
     return proof | refined | ({"repair": repaired.counts} if repaired else {})
 
 
-def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
-    """Print the figures of a single mapped surface, and the files written."""
+def _show_all(mapped: Mapped, output: bool, *, verbose: bool, keep_invalid: bool) -> None:
+    """Print the figures of a single mapped surface, and the files written.
+
+    `output`: whether there is a file that its UVs are in.
+    """
     from cembench.report.record_table import figures_table
 
     words = (("overlay", mapped.overlay), ("certificate", mapped.certificate))
     out.print(figures_table(mapped.record, full=verbose, more=words))
     for what, where in mapped.written.items():
         print_pair(f"{what:<9}", where)  # below the figures
-    if mapped.uv is not None and not mapped.written:
+    if mapped.uv is not None and not output and "output" not in mapped.written:
         more = "" if mapped.ok or keep_invalid else " --keep-invalid"
-        out.print(f"Nothing was written; add{more} -o FILE.obj to keep the map.", style="dim")
+        out.print(f"The map was not written: add{more} -o FILE.obj to keep it.", style="dim")
 
 
 def _show_line(mapped: Mapped, number: int, count: int) -> None:

@@ -51,6 +51,7 @@ from cembench.report.document import (
 from cembench.results.columns import (
     COLUMNS,
     FrameColumn,
+    is_free,
     mark_of,
     marks_explained,
     seconds_words,
@@ -378,7 +379,8 @@ def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iter
             yield from (f"{where}: {note}" for note in record.outcome.notes)
     others = sorted({record.target for record in records} - {DISK})
     if "targets" in spec.notes and others:
+        free = any(is_free(target) for target in others)
         yield (
-            f"* not a map to the disk ({', '.join(others)}): its E_C is not comparable with those "
-            "of disks"
+            f"* not a map to the disk ({', '.join(others)}): compare it with maps to the same "
+            f"target{'; E_C is over the area of the image, whose size is free' if free else ''}"
         )

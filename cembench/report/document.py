@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from itertools import groupby
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
@@ -333,8 +334,8 @@ class Findings:
         The headline, then further sentences.
     suspects : tuple of str
         Maps that are far worse than the others on their surface.
-    table : Table or None
-        The run's own figures, by surface and algorithm; not for the paper's run.
+    tables : tuple of Table
+        The paper's main claims; or the standings of each target, and the run's own figures.
     figures : tuple of Finding
         Key figures.
     picture, plot : Figure or None
@@ -344,13 +345,13 @@ class Findings:
 
     sentences: tuple[Sentence, ...]
     suspects: tuple[str, ...] = ()
-    table: Table | None = None
+    tables: tuple[Table, ...] = ()
     figures: tuple[Finding, ...] = ()
     picture: Figure | None = None
     plot: Figure | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """A whole report.
 
@@ -366,6 +367,17 @@ class Report:
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
     paper: Paper | None = None
+    #: The page that it was written to, if any.
+    page: Path | None = None
+
+    def __repr__(self) -> str:
+        """Return the title and the page, a line each."""
+        return f"{self.title}: {len(self.records)} records\n{self.page or 'not written'}"
+
+    def _repr_html_(self) -> str:
+        link = f"<a href='{escape(str(self.page))}'>{escape(str(self.page))}</a>"
+        about = f"{escape(self.title)}: {len(self.records)} records"
+        return f"{about}<br>{link if self.page else 'not written'}"
 
 
 def missing(why: str, text: str = "-") -> Value:
@@ -463,8 +475,8 @@ def sections_of(report: Report) -> Iterator[Section]:
 def items_of(report: Report, kind: type[T]) -> Iterator[T]:
     """Yield all items of a kind in reading order; the figures of galleries are figures."""
     findings = report.findings
-    if findings is not None and isinstance(findings.table, kind):
-        yield findings.table
+    if findings is not None:
+        yield from (table for table in findings.tables if isinstance(table, kind))
     for section in sections_of(report):
         for item in section.items:
             if isinstance(item, kind):

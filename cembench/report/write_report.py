@@ -91,7 +91,7 @@ def write_report(
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
-    return report
+    return replace(report, page=folder / "index.html")
 
 
 def _write_all(report: Report, evidence: Evidence, folder: Path) -> None:

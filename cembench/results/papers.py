@@ -254,6 +254,8 @@ class Paper(_Part):
     errata: tuple[Erratum, ...] = ()
     runs: tuple[HowRun, ...] = ()
     claims: tuple[StatedClaim, ...] = ()
+    #: The names of the main claims, for the head of a report (default: failing ones first).
+    headline: tuple[str, ...] = ()
     #: Numbers that the claims name.
     numbers: Mapping[str, Any] = {}
 
@@ -462,6 +464,10 @@ def _check(paper: Paper) -> None:
             what = f"no table has the column 'faces' for {model!r}"
             raise _wrong(paper.folder / "tables.toml", "tables", what)
     names = [claim.name for claim in paper.claims]
+    for name in paper.headline:
+        if name not in names:
+            what = f"there is no claim {name!r}; known: {', '.join(names) or 'none'}"
+            raise _wrong(paper.folder / "paper.toml", "headline", what)
     for name in names:
         if names.count(name) > 1:
             raise _wrong(paper.folder / "claims.toml", f"claim {name!r}", "occurs twice")

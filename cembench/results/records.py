@@ -32,6 +32,8 @@ SCHEMA_VERSION = 1
 
 #: The algorithm that others are compared with where neither a paper nor an option names one.
 REFERENCE = "cem"
+#: The algorithm that others of a target are compared with, unless a run says otherwise.
+USUAL_REFERENCES = {"disk": REFERENCE, "free boundary": "lscm", "circular holes": "koebe-cem"}
 
 #: With this many cores busy with other work, a process counts as measured on a busy machine.
 BUSY_CORES = 0.25

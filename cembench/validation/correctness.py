@@ -162,7 +162,9 @@ def _rate(
     shown = ", ".join(f"{error:.2g}" for error in errors)
     return _finding(
         f"{what} under refinement",
-        f"on {series.surface.name} {shown}: order {order:.2f}",
+        f"{shown}: order {order:.2f}",
+        surface=series.surface.name,
+        orders=(order, least),
         ok=order >= least or max(errors) <= rounding,
         least=least,
     )
@@ -176,8 +178,8 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
     errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
     return _finding(
         "exact map",
-        f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
-        f"{_order(series, errors):.2f}",
+        f"{', '.join(f'{e:.2g}' for e in errors)} away: order {_order(series, errors):.2f}",
+        surface=series.surface.name,
         ok=errors[-1] <= POSITION_ERROR,
         within=POSITION_ERROR,
     )
@@ -190,9 +192,10 @@ def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
     finest, uv = pairs[-1]
     return _finding(
         "modulus",
-        f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
+        f"off by {', '.join(f'{o:+.1e}' for o in off)}; "
         f"reciprocal error {', '.join(f'{c.reciprocal_error:.1e}' for c, _ in pairs)}",
         ok=finest.encloses(uv[finest.corners]),
+        surface=series.surface.name,
         lower=finest.lower,
         upper=finest.upper,
     )

@@ -106,11 +106,17 @@ def sentence(validation: Validation) -> str:
 
 def _invalid(faults: Sequence[ValidationFinding]) -> str:
     first, *others = faults
-    text = f"invalid: {first.name}: {first.measured}"
-    if others:
-        names = ", ".join(dict.fromkeys(fault.name for fault in others))
-        text += f"; also: {names}"
-    return text
+    if first.orders is not None:
+        order, least = first.orders
+        what = first.name.removesuffix(" under refinement")
+        return (
+            f"invalid: not conformal. Its {what} does not vanish under refinement (order "
+            f"{order:.2f} on {first.surface}; a conformal map has {least:g} or more). If that is "
+            "intended, declare conformal=False"
+        )
+    more = f"; {len(others)} more checks found a fault" if len(others) > 1 else ""
+    also = f"; so did {others[0].title}" if len(others) == 1 else more
+    return f"invalid: the check {first.title} found a fault: {first.measured}{also}"
 
 
 def _energy_words(against: BaselineComparison) -> str:

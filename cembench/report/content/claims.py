@@ -41,7 +41,17 @@ _UNTESTED: Verdict = "not tested here"
 
 
 def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
-    """Return all claims of the run's paper with their verdicts, in the order of its text.
+    """Return all claims of the run's paper with their verdicts, in the order of its text."""
+    return claims_of(evidence, inspections, [claim.name for claim in evidence.paper.claims])
+
+
+def claims_of(
+    evidence: Evidence,
+    inspections: Inspections,
+    names: Sequence[str],
+    origin: MeshOrigin | None = None,
+) -> list[Claim]:
+    """Return these claims with their verdicts, on the surfaces of an origin alone or on all.
 
     Raises
     ------
@@ -50,8 +60,10 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
 
     """
     frame, known = claims_frame(evidence, inspections), known_names(evidence)
+    if origin is not None:
+        frame = frame[frame["origin"] == origin]
     tested = []
-    for claim in evidence.paper.claims:
+    for claim in (one for one in evidence.paper.claims if one.name in names):
         try:
             tested.append(_tested(evidence, frame, known, claim))
         except ParameterError as error:
