@@ -26,7 +26,6 @@ from cembench.api.settings import (
 )
 from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 from cembench.core.wording import Advice
 from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
@@ -42,14 +41,13 @@ if TYPE_CHECKING:
     from cembench.running.surfaces import SurfaceInput
     from cembench.running.watcher import Watcher
 
-#: Columns of :meth:`Run.table`, under the headings that they have on a terminal.
+#: Columns of :meth:`Run.table`, under the headings that they have on a terminal; 80 columns wide.
 FEW = {
     "surface": "surface",
     "algorithm": "algorithm",
     "solves": "solves",
     "status": "status",
     "seconds": "seconds",
-    "speedup": "speedup",
     "comparable_energy": "E_C",
     "angle_error_mean_deg": "angle°",
     "flipped_triangles": "folds",
@@ -106,7 +104,7 @@ class Run:
         Parameters
         ----------
         reference : str
-            The algorithm whose speedup over the others is included.
+            The algorithm whose speedup over the others is included with `full`.
         full : bool
             Whether to return all columns, about eighty, under the names that records have,
             instead of those most looked at.
@@ -114,9 +112,10 @@ class Run:
         Returns
         -------
         pandas.DataFrame
-            Surface, algorithm, status, median seconds, speedup of the reference, E_C (over the
-            image's area where the boundary is free), mean angle error in degrees, and folds. The
-            linear-algebra policy is a column if there are several.
+            Surface, algorithm, status, median seconds, E_C (over the image's area where the
+            boundary is free), mean angle error in degrees, and folds. The
+            linear-algebra policy is a column if there are several. Numbers are rounded as on a
+            terminal.
 
         """
         import pandas as pd
@@ -127,6 +126,7 @@ class Run:
         if full:
             return table
         table["comparable_energy"] = [comparable_energy(record) for record in self.records()]
+        table = table.round({"comparable_energy": 4, "angle_error_mean_deg": 2, "seconds": 5})
         left_out = {"solves"} if len(table) and table["solves"].nunique() == 1 else set()
         few = [name for name in FEW if name in table and name not in left_out]
         return table[few].rename(columns=FEW)
@@ -216,8 +216,6 @@ class Run:
 
         Raises
         ------
-        MissingExtra
-            A package for reports is not installed.
         RecordError
             The run has no records, a record or a map is damaged, or the folder cannot be written.
         ParameterError
@@ -231,7 +229,6 @@ class Run:
         from cembench.results.store import Store
         from cembench.results.verify import Depth, sound_records
 
-        require(Extra.REPORT, "a report")
         asked = find_paper(paper) if paper else None
         records = sound_records(Store(self.folder), Depth.everything if verify else Depth.sample)
         files = [Path(file) for file in tables]

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from cembench.api.benchmark import Run
 from cembench.api.settings import AnyPath, budget_seconds, bytes_of
 from cembench.core.arguments import checked
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
@@ -89,8 +88,6 @@ def reproduce(
 
     Raises
     ------
-    MissingExtra
-        A package for reports is not installed.
     RecordError
         The folder is not a run, or cannot be written to.
     ParameterError
@@ -115,7 +112,6 @@ def reproduce(
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
-    require(Extra.REPORT, "a report")
     folder = Path(output)
     run_folder.check(folder)
     folders.check(folder / "report", "report")

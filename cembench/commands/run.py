@@ -150,7 +150,7 @@ def show(
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map
 
-    if Path(cell).is_dir():
+    if cell and Path(cell).is_dir():
         raise ParameterError(
             f"{cell} is a folder, and show takes a cell: cembench show CELL --run {cell}. "
             f"cembench status {cell} lists its cells."

@@ -245,7 +245,7 @@ def declared_table(
     known = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(frame))}
     known |= {"surfaces": str(frame["place"].nunique())}
     known |= {"once": once if evidence.stand_ins_left_out else ""}
-    known |= {"reference": evidence.reference_label, **texts}
+    known |= {"reference": evidence.reference_label, "to": "", **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
         return _of_surfaces(evidence, spec, frame, surfaces, called or name, known, below)

@@ -162,7 +162,7 @@ def _rate(
     shown = ", ".join(f"{error:.2g}" for error in errors)
     return _finding(
         f"{what} under refinement",
-        f"{shown}: order {order:.2f}",
+        f"on {series.surface.name} {shown}: order {order:.2f}",
         surface=series.surface.name,
         orders=(order, least),
         ok=order >= least or max(errors) <= rounding,
@@ -178,7 +178,8 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
     errors = [distance(_uv(m), exact(m.mesh.V), moebius=True) for m in series.maps]
     return _finding(
         "exact map",
-        f"{', '.join(f'{e:.2g}' for e in errors)} away: order {_order(series, errors):.2f}",
+        f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
+        f"{_order(series, errors):.2f}",
         surface=series.surface.name,
         ok=errors[-1] <= POSITION_ERROR,
         within=POSITION_ERROR,
@@ -192,7 +193,7 @@ def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
     finest, uv = pairs[-1]
     return _finding(
         "modulus",
-        f"off by {', '.join(f'{o:+.1e}' for o in off)}; "
+        f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
         f"reciprocal error {', '.join(f'{c.reciprocal_error:.1e}' for c, _ in pairs)}",
         ok=finest.encloses(uv[finest.corners]),
         surface=series.surface.name,

@@ -122,7 +122,7 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
         "Checks",
         [Column(title, numeric=False, detail=title == "allowed") for title in titles],
         [
-            [finding.title, _found(finding), finding.measured, finding.allowed]
+            [finding.name, _found(finding), finding.measured, finding.allowed]
             for finding in findings
         ],
         notes=tuple(

@@ -114,9 +114,8 @@ def _invalid(faults: Sequence[ValidationFinding]) -> str:
             f"{order:.2f} on {first.surface}; a conformal map has {least:g} or more). If that is "
             "intended, declare conformal=False"
         )
-    more = f"; {len(others)} more checks found a fault" if len(others) > 1 else ""
-    also = f"; so did {others[0].title}" if len(others) == 1 else more
-    return f"invalid: the check {first.title} found a fault: {first.measured}{also}"
+    names = ", ".join(dict.fromkeys(fault.name for fault in others))
+    return f"invalid: {first.name}: {first.measured}" + (f"; also: {names}" if names else "")
 
 
 def _energy_words(against: BaselineComparison) -> str:

@@ -139,13 +139,13 @@ def test_the_papers_main_claims_have_intervals_over_enough_models(evidence):
     run = replace(evidence, records=six)
     table = head_table(run, {}, [])
     assert table.columns[2].title == "on 6 models of the paper"
-    (_, qiem), (_, fdm), (_, ldm) = rates_of(table)
+    (_, qiem), (_, fdm), (_, _) = rates_of(table)
     assert qiem == "-"
     mean, low, high = map(float, re.findall(r"-?\d+\.\d", fdm))
     assert mean == pytest.approx(2.75, abs=0.06)
     assert low < mean < high
     assert fdm.startswith("less than printed")
-    sentence = headline(run, [])
+    sentence = headline(run)
     assert "in 6 of the 12 comparisons that these rounds decide" in sentence
     assert "On 6 models of the paper, its average speedup is less than printed over " in sentence
     assert not re.search(r"\d\.\d", sentence)

@@ -174,7 +174,7 @@ class Evidence:
         number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
         model), `once` (the same, or of no model), `printed` (an algorithm of the paper), and
         `reference`; `contest`, the name of target and policy, with rivals or not (`contested`),
-        and `to`, the words for the target where a run has several; `as_good`: about as good as the
+        and `to`, the words for a target that is not the disk; `as_good`: about as good as the
         best map to the same target there; and of the comparison with the main parameters of the
         contest's reference `comparison`, `speedup` with its interval, `verdict`, `ratio`, and
         `paired`, the rounds with both.
@@ -193,7 +193,7 @@ class Evidence:
             about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
             about["contest"] = self.contest_name(own.target, record.cell.solves)
             about["contested"] = own.target in self.contests
-            about["to"] = f", {own.target}" if len(self.targets) > 1 else ""
+            about["to"] = "" if own.target == DISK else f", {own.target}"
             more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
             more["model"], more["origin"] = surface.paper_row or None, surface.origin
             more["counted"] = surface in counted
@@ -381,8 +381,8 @@ class Evidence:
         return tuple(target for target in self.targets if number[target] > 1)
 
     def contest_name(self, target: str, policy: str) -> str:
-        """Return the name of a target under a policy, without the target if it is the only one."""
-        return policy if len(self.targets) == 1 else f"{target}, {policy}"
+        """Return the name of a target under a policy, without the target if it is the disk."""
+        return policy if target == DISK else f"{policy}, {target}"
 
     @property
     def contest_names(self) -> list[str]:

@@ -40,7 +40,8 @@ def findings(
     if claims:
         main = head_table(evidence, inspections, claims)
         tables = [main] if main else []
-        words = [(headline(evidence, claims),), verdicts_counted(claims)]
+        main_words = headline(evidence)
+        words = [*([(main_words,)] if main_words else []), verdicts_counted(claims)]
         shown, figures = evidence.reference_label, []
     else:
         own = declared_table(evidence, "own-surfaces")

@@ -14,7 +14,7 @@ from cembench.results.families import enough_rounds, rate_interval
 from cembench.results.multiple_testing import geometric
 from cembench.results.report_records import PACKED, RECORDS, text_rows
 
-#: The kept report that README quotes.
+#: The kept report that pages quote.
 KEPT = ROOT / "reports/paper"
 #: A policy of solving, and the table of its averages.
 POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
@@ -58,7 +58,7 @@ def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
     return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
 
 
-def readme_speedups(*, report: Path = KEPT) -> Section:
+def cem_speedups(*, report: Path = KEPT) -> Section:
     """Tabulate how much faster CEM is, from the tables of a report and its records.
 
     Averages have a 95 % interval over the models, those of one family together, where most cells
@@ -90,7 +90,7 @@ def readme_speedups(*, report: Path = KEPT) -> Section:
         }
         for name in ("QIEM", "FDM", "LDM")
     ]
-    return Section([Table(rows, layout)], "README.md")
+    return Section([Table(rows, layout)], "docs/papers.md")
 
 
 def _rows(file: Path) -> list[dict[str, str]]:
