@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import csv
 import json
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -24,7 +26,21 @@ LAYOUT = """
 
 def readme_answer(*, report: Path = KEPT) -> Section:
     """Tabulate what of the paper holds on the models of its own that are public."""
-    return Section([Table([*_speeds(report), *_maps(report)], LAYOUT)], "README.md")
+    table = Table([*_speeds(report), *_maps(report)], LAYOUT)
+    return Section([table, _verdicts(report)], "README.md")
+
+
+def _verdicts(report: Path) -> str:
+    """Return how many claims hold over all surfaces of the report, and which do not."""
+    with (report / "tables/claims-at-a-glance.csv").open(encoding="utf-8", newline="") as lines:
+        claims = list(csv.DictReader(lines))
+    counts = Counter(claim["verdict"] for claim in claims)
+    failing = [claim["claim"].rstrip(".") for claim in claims if "not hold" in claim["verdict"]]
+    named = f" ({'; '.join(failing)})" if failing else ""
+    return (
+        f"Of all {len(claims)} claims, over these models and the stand-ins, {counts['holds']} "
+        f"hold, {counts['holds in part']} hold in part, and {len(failing)} do not{named}."
+    )
 
 
 def _speeds(report: Path) -> Iterator[dict[str, Any]]:
@@ -54,9 +70,12 @@ def _speeds(report: Path) -> Iterator[dict[str, Any]]:
 
 def _maps(report: Path) -> Iterator[dict[str, Any]]:
     """Yield what is claimed of maps: folds, energies, and angles."""
+    rows = [row for row in text_rows(report) if row["solves"] == "reuse"]
+    usual = Counter((row["algorithm"], row["parameters"]) for row in rows)
+    rows.sort(key=lambda row: -usual[row["algorithm"], row["parameters"]])
     maps: dict[str, dict[str, dict[str, str]]] = {}
-    for row in text_rows(report):
-        if row["origin"] == "model" and row["solves"] == "reuse":
+    for row in rows:
+        if row["origin"] == "model":
             maps.setdefault(row["paper_row"], {}).setdefault(row["algorithm"], row)
     models = list(maps.values())
     n = len(models)
@@ -66,7 +85,9 @@ def _maps(report: Path) -> Iterator[dict[str, Any]]:
         [float(own[name]["conformal_energy"]) for name in ("fdm", "ldm", "cem")] for own in models
     ]
     alike = sum(max(own) <= SIMILAR * min(own) for own in energies)
-    yield _row("FDM, LDM and CEM reach similar energies (within 25 %)", "", f"{alike} of {n}", alike)
+    yield _row(
+        "FDM, LDM and CEM reach similar energies (within 25 %)", "", f"{alike} of {n}", alike
+    )
     means = [
         [float(own[name]["angle_error_mean_deg"]) for name in ("fdm", "ldm", "cem")]
         for own in models

@@ -12,38 +12,44 @@ from typing import Literal
 import numpy as np
 import pytest
 
-from benchmarks import readme_speedups
+from benchmarks import cem_speedups, readme_answer
 from benchmarks.__main__ import main, parser_of, studies
 from benchmarks.kept_report import DIGITS
 from benchmarks.pages import ROOT, Section, Table, filled, marks
 
 
-def speedups(report=readme_speedups.KEPT):
-    return str(readme_speedups.readme_speedups(report=report))
+def speedups(report=cem_speedups.KEPT):
+    return str(cem_speedups.cem_speedups(report=report))
 
 
 def test_readme_says_what_the_kept_report_says():
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    assert filled(readme, "readme_speedups", speedups()) == readme
+    assert filled(readme, "readme_answer", str(readme_answer.readme_answer())) == readme
+    page = (ROOT / "docs/papers.md").read_text(encoding="utf-8")
+    assert filled(page, "cem_speedups", speedups()) == page
+
+
+def test_readme_is_short():
+    assert len((ROOT / "README.md").read_text(encoding="utf-8").splitlines()) <= 100
 
 
 def test_another_report_gives_another_table(tmp_path):
     shutil.copytree(ROOT / "reports/paper/tables", tmp_path / "tables")
     averages = tmp_path / "tables/averages.csv"
-    kept = readme_speedups.averages(averages)["mean rate (as the paper)"]["QIEM here"]
+    kept = cem_speedups.averages(averages)["mean rate (as the paper)"]["QIEM here"]
     averages.write_text(averages.read_text().replace(kept, "7.25"))
     assert "| QIEM | 8.5 | 6.8 | 7.2 |" in speedups(tmp_path)
 
 
-@pytest.mark.parametrize("policy", readme_speedups.POLICIES)
+@pytest.mark.parametrize("policy", cem_speedups.POLICIES)
 def test_the_rounds_of_the_records_give_the_averages_of_the_tables(policy):
-    folder = readme_speedups.KEPT
+    folder = cem_speedups.KEPT
     rounded = 10.0 ** (1 - DIGITS)  # a ratio of two seconds in the records
-    there = readme_speedups.averages(folder / "tables" / readme_speedups.POLICIES[policy])
+    there = cem_speedups.averages(folder / "tables" / cem_speedups.POLICIES[policy])
     for name in ("QIEM", "FDM", "LDM"):
-        rows = readme_speedups.rates(folder, name.lower(), policy)
+        rows = cem_speedups.rates(folder, name.lower(), policy)
         figures = np.exp([np.median(np.log(json.loads(row["ratios"]))) for row in rows])
-        for reading, average in readme_speedups.AVERAGES.items():
+        for reading, average in cem_speedups.AVERAGES.items():
             rate = average(figures) - 1
             assert rate == pytest.approx(float(there[reading][f"{name} here"]), rel=rounded)
 
@@ -83,7 +89,7 @@ def test_only_what_is_between_the_marks_is_replaced(page, maker):
 
 def test_a_page_without_marks_is_refused():
     with pytest.raises(SystemExit, match="lacks the marks"):
-        filled("no marks", "readme_speedups", "")
+        filled("no marks", "cem_speedups", "")
 
 
 def test_a_row_without_a_value_has_a_dash_and_the_frame_keeps_the_figures():
@@ -145,7 +151,7 @@ def test_an_unknown_study_is_refused_with_the_known_ones():
 
 
 def test_a_study_is_printed_and_its_tables_are_written_where_asked(tmp_path, capsys):
-    main(["readme-speedups", "--report", "reports/paper", "--save", str(tmp_path / "out")])
+    main(["cem-speedups", "--report", "reports/paper", "--save", str(tmp_path / "out")])
     assert "| QIEM |" in capsys.readouterr().out
     assert "QIEM" in (tmp_path / "out/table-1.csv").read_text()
 
