@@ -110,7 +110,7 @@ def rates_of(table):
 
 
 def test_the_papers_main_claims_stand_beside_what_was_measured(evidence):
-    table = head_table(evidence, {}, [])
+    table = head_table(evidence, [])
     # Invented: QIEM takes 8 s on one model, FDM 3 and 6, LDM 0.5 and 1; CEM 1, as `backslash` 2.
     assert [column.title for column in table.columns] == ["claim", "printed", "on 2 stand-ins"]
     printed, here = zip(*rates_of(table), strict=True)
@@ -137,7 +137,7 @@ def test_the_papers_main_claims_have_intervals_over_enough_models(evidence):
     models = find_paper("cem").models[:6]
     six = tuple(on(r, 1 + k / 10, model) for k, model in enumerate(models) for r in records)
     run = replace(evidence, records=six)
-    table = head_table(run, {}, [])
+    table = head_table(run, [])
     assert table.columns[2].title == "on 6 models of the paper"
     (_, qiem), (_, fdm), (_, _) = rates_of(table)
     assert qiem == "-"
@@ -163,7 +163,7 @@ def test_a_claim_is_judged_on_models_and_on_stand_ins_apart(evidence):
     known = [one for one in evidence.paper.claims if one.name == "no-folding"]
     asked = evidence.paper.model_copy(update={"claims": tuple(known), "stated": {}})
     run = replace(evidence, records=(*both, *wrong), asked=asked, exhibits=())
-    table = head_table(run, {}, claims(run, {}))
+    table = head_table(run, claims(run, {}))
     assert [c.title for c in table.columns[2:]] == ["on 1 model of the paper", "on 1 stand-in"]
     assert [value.text.partition(":")[0] for value in table.rows[0][2:]] == [
         "does not hold here",

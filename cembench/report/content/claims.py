@@ -37,21 +37,11 @@ _KINDS: Mapping[str, Kind] = {
 }
 _IN_PRINT = ("model as printed", "models as printed")
 _NO_MODEL = "None is a model of the paper itself: the verdict is about the algorithms here."
-_UNTESTED: Verdict = "not tested here"
+UNTESTED: Verdict = "not tested here"
 
 
 def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
-    """Return all claims of the run's paper with their verdicts, in the order of its text."""
-    return claims_of(evidence, inspections, [claim.name for claim in evidence.paper.claims])
-
-
-def claims_of(
-    evidence: Evidence,
-    inspections: Inspections,
-    names: Sequence[str],
-    origin: MeshOrigin | None = None,
-) -> list[Claim]:
-    """Return these claims with their verdicts, on the surfaces of an origin alone or on all.
+    """Return all claims of the run's paper with their verdicts, in the order of its text.
 
     Raises
     ------
@@ -60,10 +50,8 @@ def claims_of(
 
     """
     frame, known = claims_frame(evidence, inspections), known_names(evidence)
-    if origin is not None:
-        frame = frame[frame["origin"] == origin]
     tested = []
-    for claim in (one for one in evidence.paper.claims if one.name in names):
+    for claim in evidence.paper.claims:
         try:
             tested.append(_tested(evidence, frame, known, claim))
         except ParameterError as error:
@@ -142,7 +130,7 @@ def _tested(
     if "printed" in claim.on:
         parts["printed"] = _judged(printed_frame(evidence, frame), known, claim, _IN_PRINT)
     none = filled(claim.none, frame, known) or "Nothing in this run to test it on."
-    tested = {origin: part for origin, part in parts.items() if part.verdict != _UNTESTED}
+    tested = {origin: part for origin, part in parts.items() if part.verdict != UNTESTED}
     parts = tested or {origin: part for origin, part in parts.items() if part.on}
     voting = [part for origin, part in tested.items() if (origin,) == claim.on or origin in _KINDS]
     first = voting[0] if voting else Judged("", none)

@@ -38,7 +38,7 @@ def findings(
     contests = contests_of(evidence, evidence.policies[0])
     words: list[Sentence] = []
     if claims:
-        main = head_table(evidence, inspections, claims)
+        main = head_table(evidence, claims)
         tables = [main] if main else []
         main_words = headline(evidence)
         words = [*([(main_words,)] if main_words else []), verdicts_counted(claims)]

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from cembench.report.content.claims import Inspections, claims_of, under
+from cembench.report.content.claims import UNTESTED, under
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.printed_tables import MEAN_RATE, measured, printed_rates
 from cembench.report.content.standings import listed
@@ -89,16 +89,14 @@ def _any(names: Sequence[str]) -> str:
     return f"{', '.join(first)} or {last}" if first else last
 
 
-def head_table(
-    evidence: Evidence, inspections: Inspections, tested: Sequence[Claim]
-) -> Table | None:
+def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
     """Return the main claims: what is printed, and what holds here by the origin of surfaces."""
     origins = origins_of(evidence)
     titles = ("claim", "printed", *(origins.values() or ["here"]))
     columns = [Column(title, numeric=False) for title in titles]
     rated = evidence.paper.stated.get("rate")
     rows = list(_rate_rows(evidence, list(origins)))[:ROWS] if rated else []
-    rows += list(_claim_rows(evidence, inspections, tested, list(origins)))[: ROWS - len(rows)]
+    rows += list(_claim_rows(evidence, tested, list(origins)))[: ROWS - len(rows)]
     if not rows:
         return None
     note = (
@@ -151,25 +149,20 @@ def _rate(
 
 
 def _claim_rows(
-    evidence: Evidence,
-    inspections: Inspections,
-    tested: Sequence[Claim],
-    origins: Sequence[MeshOrigin],
+    evidence: Evidence, tested: Sequence[Claim], origins: Sequence[MeshOrigin]
 ) -> Iterator[list[Plain]]:
-    """Yield the paper's main claims, by default the failing ones first."""
+    """Yield the paper's main claims, by default the failing ones first.
+
+    What is printed is the same test on the paper's own tables, where they have what it takes.
+    """
     order, known = list(VERDICTS), {claim.name: claim for claim in tested}
     ranked = sorted(known.values(), key=lambda claim: order.index(claim.verdict))
     chosen = [known[n] for n in evidence.paper.headline if n in known] or ranked
-    names = [claim.name for claim in chosen[:ROWS]]
-    by_origin: list[dict[str, Any]] = [
-        {one.name: one for one in claims_of(evidence, inspections, names, origin)}
-        for origin in origins
-    ] or [known]
-    for name in names:
-        row: list[Plain] = [known[name].plain, ""]
-        for judged in by_origin:
-            claim = judged[name]
-            row.append(_judged(claim.verdict, claim.counted))
+    for claim in chosen[:ROWS]:
+        control = claim.parts.get("printed")
+        row: list[Plain] = [claim.plain, control.counted_verdict if control else ""]
+        parts = [claim.parts.get(origin) for origin in origins] if origins else [claim]
+        row += [_judged(part.verdict, part.counted) if part else words(UNTESTED) for part in parts]
         yield row
 
 

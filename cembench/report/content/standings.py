@@ -70,7 +70,8 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
     """
     frame = evidence.frame
     rows = frame[(frame["target"] == target) & frame["main"] & (frame["solves"] == policy)]
-    maps = rows[rows["ok"] & (rows["seconds"] > 0) & rows[ANGLE].notna()]
+    # An angle error to which the surface was fitted decides nothing.
+    maps = rows[rows["ok"] & ~rows["fitted"] & (rows["seconds"] > 0) & rows[ANGLE].notna()]
     if maps.empty:
         return {}
     wide = maps.pivot(index="place", columns="label", values=["key", ANGLE, "seconds"])
@@ -98,6 +99,7 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
         **{"order": order, "best": best, "others": others, "good": good, "means": means},
         **{"n": len(common), "surfaces": len(wide), "families": len(set(families)), "few": few},
         **{"absent": [one for one in tried if one not in chosen], "times": AS_GOOD},
+        "fitted": set(rows["label"][rows["fitted"]]),
         **{"worse": [one for one in order if one not in good], "degrees": DEGREES},
         **{"names": listed, "surfaces_words": surfaces_words, "against": against},
         **{"speeds": speeds, "within": f"{100 * NEAR:.0f}", "ended": _ended(rows)},
@@ -188,8 +190,9 @@ def standings(contest: Mapping[str, Any]) -> Table:
         ),
     ]
     rows = list(_ranked(contest))
+    fitted, few = "stand-ins were fitted to its angle errors", "too few valid maps to be compared"
     rows += [
-        [label, _of(contest, label), *[missing("too few valid maps to be compared")] * 5]
+        [label, _of(contest, label), *[missing(fitted if label in contest["fitted"] else few)] * 5]
         for label in contest["absent"]
     ]
     name = "standings" if contest["target"] == DISK else f"standings-{slug(contest['target'])}"
