@@ -1,8 +1,7 @@
-"""How much faster is CEM? From the tables of a kept report."""
+"""How much faster is CEM, on the paper's models and on stand-ins? From a kept report's records."""
 
 from __future__ import annotations
 
-import csv
 import json
 from collections import Counter
 from pathlib import Path
@@ -10,90 +9,78 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.pages import ROOT, Section, Table
+from cembench.report.content.printed_tables import printed_rates
 from cembench.results.families import enough_rounds, rate_interval
 from cembench.results.multiple_testing import geometric
-from cembench.results.report_records import PACKED, RECORDS, text_rows
+from cembench.results.papers import find_paper
+from cembench.results.report_records import text_rows
 
 #: The kept report that pages quote.
 KEPT = ROOT / "reports/paper"
-#: A policy of solving, and the table of its averages.
-POLICIES = {"reuse": "averages.csv", "backslash": "averages-backslash.csv"}
-#: The readings that are shown, by the beginning of their rows.
-MEAN, GEOMETRIC = "mean rate (as the paper)", "geometric mean of ratios - 1"
-AVERAGES = {MEAN: np.mean, GEOMETRIC: geometric}
+POLICIES = ("reuse", "backslash")
+ORIGINS = {"model": "models", "stand-in": "stand-ins"}
+#: The readings that are shown, and whether their intervals are of logarithms.
+AVERAGES = ((np.mean, False), (geometric, True))
+LAYOUT = """
+| CEM against | on | printed for these: mean | geometric | `reuse`: mean | geometric \
+| `backslash`: mean | geometric |
+|---|---|---:|---:|---:|---:|---:|---:|
+| {name} | {n} {on} | {printed[0]:.1f} | {printed[1]:.1f} | {reuse[0]} | {reuse[1]} \
+| {backslash[0]} | {backslash[1]} |"""
 
 
-def averages(file: Path) -> dict[str, dict[str, str]]:
-    """Read a table of averages, its rows by their reading."""
-    return {row["reading"]: row for row in _rows(file)}
-
-
-def rates(report: Path, algorithm: str, policy: str) -> list[dict[str, str]]:
+def rates(
+    report: Path, algorithm: str, policy: str, origin: str | None = None
+) -> list[dict[str, str]]:
     """Return the records of an algorithm with its rates of speedup, for every model once.
 
     A model that was measured itself counts, and not its stand-in; of a method with several sets of
-    parameters the one that was measured on most surfaces.
+    parameters the one that was measured on most surfaces. Models without a printed rate have none.
     """
+    paper = find_paper("cem")
     own = [
         row
         for row in text_rows(report)
         if (row["solves"], row["algorithm"]) == (policy, algorithm)
-        and row["paper_row"]
         and row["speedup"]
+        and printed_rates(paper, algorithm, [row["paper_row"]])
     ]
     counts = Counter(row["parameters"] for row in own)
     own.sort(key=lambda row: (row["origin"] == "model", counts[row["parameters"]]))
-    return list({row["paper_row"]: row for row in own}.values())
+    once = {row["paper_row"]: row for row in own}.values()
+    return [row for row in once if origin in (None, row["origin"])]
 
 
-def interval(report: Path, algorithm: str, policy: str, reading: str) -> str:
-    """Return the interval of an average in words; nothing where cells have too few rounds."""
-    if not {PACKED, RECORDS} & {file.name for file in report.iterdir()}:
-        return ""
-    rows = rates(report, algorithm, policy)
-    if not enough_rounds([len(json.loads(row["ratios"] or "[]")) for row in rows]):
-        return ""
+def averages(rows: list[dict[str, str]]) -> list[str]:
+    """Return both averages of rates, with intervals over models where most have the rounds."""
     ratios = [1 + float(row["speedup"]) for row in rows]
-    rate = rate_interval(ratios, [row["family"] for row in rows], log=reading == GEOMETRIC)
-    return f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
+    enough = enough_rounds([len(json.loads(row["ratios"] or "[]")) for row in rows])
+    texts = []
+    for average, log in AVERAGES:
+        rate = rate_interval(ratios, [row["family"] for row in rows], log=log) if enough else None
+        between = f" ({rate.low:.1f} to {rate.high:.1f})" if rate else ""
+        texts.append(f"{average(ratios) - 1:.1f}{between}" if ratios else "-")
+    return texts
 
 
 def cem_speedups(*, report: Path = KEPT) -> Section:
-    """Tabulate how much faster CEM is, from the tables of a report and its records.
+    """Tabulate how much faster CEM is on models and on stand-ins, from the records of a report.
 
     Averages have a 95 % interval over the models, those of one family together, where most cells
     have the rounds for one.
     """
-    files = {policy: report / "tables" / file for policy, file in POLICIES.items()}
-    by_policy = {policy: averages(file) for policy, file in files.items() if file.exists()}
-    if not by_policy:
-        raise SystemExit(f"{report}/tables holds no {' or '.join(POLICIES.values())}.")
-    heads = [f"`{policy}`: mean | geometric" for policy in by_policy]
-    columns = " | ".join(f"{{{policy}[0]}} | {{{policy}[1]}}" for policy in by_policy)
-    layout = f"""
-| CEM against | printed: mean | geometric | {" | ".join(heads)} |
-|---|{"---:|" * (2 + 2 * len(heads))}
-| {{name}} | {{printed[0]:.1f}} | {{printed[1]:.1f}} | {columns} |"""
-    first = next(iter(by_policy.values()))
-    rows = [
-        {
-            "name": name,
-            "printed": [float(first[reading][f"{name} printed, all"]) for reading in AVERAGES],
-            **{
-                policy: [
-                    f"{float(averages[reading][f'{name} here']):.1f}"
-                    + interval(report, name.lower(), policy, reading)
-                    for reading in AVERAGES
-                ]
-                for policy, averages in by_policy.items()
-            },
-        }
-        for name in ("QIEM", "FDM", "LDM")
-    ]
-    return Section([Table(rows, layout)], "docs/papers.md")
-
-
-def _rows(file: Path) -> list[dict[str, str]]:
-    csv.field_size_limit(2**31 - 1)
-    with file.open(encoding="utf-8", newline="") as lines:
-        return list(csv.DictReader(lines))
+    paper, rows = find_paper("cem"), []
+    for name in paper.compared:
+        for origin, on in ORIGINS.items():
+            own = {policy: rates(report, name, policy, origin) for policy in POLICIES}
+            models = [row["paper_row"] for row in max(own.values(), key=len)]
+            printed = np.array(printed_rates(paper, name, models)) + 1
+            if models:
+                rows.append(
+                    {
+                        **{"name": name.upper(), "n": len(models), "on": on},
+                        "printed": [average(printed) - 1 for average, _ in AVERAGES],
+                        **{policy: averages(records) for policy, records in own.items()},
+                    }
+                )
+    return Section([Table(rows, LAYOUT)], "docs/papers.md")

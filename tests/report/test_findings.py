@@ -291,7 +291,7 @@ def test_the_head_says_how_many_times_are_unstable(evidence):
     timed = sum(bool(record.outcome.rounds) for record in evidence.records)
     times, ratios = words_of(findings(evidence, {}, []))[-2:]
     assert f" of {timed} times " in times
-    assert " unstable (95 % interval wider than 10% of the figure)" in times
+    assert " unstable (95 % interval wider than 25% of the figure)" in times
     assert ratios.startswith("Ratios of two algorithms scatter by ")
 
 
