@@ -26,8 +26,8 @@ READINGS: dict[str, dict[str, Any]] = {
 }
 OFF_CIRCLE = find_paper("cem").numbers["off_circle"]
 LAYOUT = """
-| surface | triangles | holes | as printed: off a circle, % | mean angle error | the usual reading: \
-off a circle, % | mean angle error |
+| surface | triangles | holes | as printed: off a circle, % | mean angle error \
+| the usual reading: off a circle, % | mean angle error |
 |---|---:|---:|---:|---:|---:|---:|
 | {surface} | {faces:,} | {holes} | {printed[off]:.2g} | {printed[angle]:.2f} | {usual[off]:.2g} \
 | {usual[angle]:.2f} |"""
