@@ -5,6 +5,7 @@ Their maps are valid and promise nothing, so that `validate` can find fault with
 
 import gc
 import hashlib
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +142,27 @@ pool = []
 def pool_of_one(mesh: DiskMesh) -> Parameterization:
     pool.extend([] if pool else [ThreadPoolExecutor(1)])
     return Parameterization(pool[0].submit(work, mesh).result())
+
+
+sleeping = []
+
+
+@algorithm("sleeping-pool", title="Has a pool that sleeps", target="disk", conformal=False)
+def sleeping_pool(mesh: DiskMesh) -> Parameterization:
+    if not sleeping:
+        sleeping.append(multiprocessing.get_context("spawn").Pool(2))
+    return Parameterization(work(mesh))
+
+
+@algorithm("sleeping-child", title="Has a child that sleeps", target="disk", conformal=False)
+def sleeping_child(mesh: DiskMesh) -> Parameterization:
+    shared = SharedMemory(create=True, size=16 * mesh.n)  # which starts a process that sleeps
+    uv = np.ndarray(mesh.n, complex, shared.buf)
+    uv[:] = work(mesh)
+    answer = Parameterization(uv.copy())
+    shared.close()
+    shared.unlink()
+    return answer
 
 
 def endless():

@@ -45,6 +45,8 @@ FOUND = {
     "kept-factor": None,
     "factor-by-triangles": None,
     "pool": None,
+    "sleeping-child": None,
+    "sleeping-pool": None,
     "foreseen": None,
     "slow-clocks": FaultKind.IMPOSSIBLE_TIMES,
     "warmed-up": None,

@@ -24,6 +24,8 @@ from cembench.running.surfaces import generate_surface
 from cembench.running.timing_checks import Used, impossible, incomparable, is_cold
 
 MORE, AHEAD = FaultKind.MORE_CORES, FaultKind.WORKS_AHEAD
+#: Something ran before most calls.
+OFTEN = {"wall": 0.1, "own": 0.1, "disturbed": 4, "looked": 5, "between": 0.02}
 
 
 @pytest.mark.parametrize(
@@ -43,8 +45,9 @@ MORE, AHEAD = FaultKind.MORE_CORES, FaultKind.WORKS_AHEAD
         (Used(wall=1.0, own=0.9, beside=0.01), (), 1, []),
         (Used(wall=1.0, own=0.9, beside=0.2), (), 1, [AHEAD]),
         (Used(wall=1.0, own=0.9, beside=0.2), (), 2, []),
-        (Used(wall=0.1, disturbed=4, looked=5, beside=0.003, between=0.02), (), 1, [AHEAD]),
-        (Used(wall=0.1, disturbed=4, looked=5, beside=0.0002, between=0.02), (), 1, []),
+        (Used(**OFTEN, beside=0.003), (), 1, [AHEAD]),
+        (Used(**OFTEN, beside=0.0002), (), 1, []),
+        (Used(wall=2.0, own=0.4, between=0.5), (), 1, [AHEAD]),
         (Used(wall=1.0, own=0.9, between=0.4), (), 1, []),
         (Used(wall=1.0, own=0.9, between=0.9, cold=1.0), (), 1, []),
         (Used(wall=1.0, own=0.9, between=0.7, preparing=0.1), (), 1, []),
