@@ -5,10 +5,10 @@ stretch by a millionth. A rigid motion does not change the conformal map, so a k
 be right. A stretch changes it by about as much as the stretch itself: far more than rounding, and
 far less than any table shows.
 
-It is renumbered too: vertices, triangles and the corners within triangles are rotated cyclically,
-by random numbers. A matrix or factor that was kept for other numbers is useless, even as a
-preconditioner, and what was kept by the triangles is not found. What was near in memory stays near,
-and so the work stays the same.
+It is renumbered too: the rows of vertices and of triangles are cut into blocks of random lengths,
+which come in random order, and the corners of the triangles of a block are rotated. A matrix or
+factor that was kept for other numbers is useless, even as a preconditioner, and what was kept by
+the triangles is not found. What was near in memory stays near, and so the work stays the same.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Whole = NDArray[np.int64]
 
 #: Name of the identity motion.
 UNMOVED = ""
@@ -74,27 +75,41 @@ def may_be(name: str, asked: str) -> bool:
     return re.fullmatch(pattern, name) is not None
 
 
-def numbering(name: str, n: int, m: int) -> tuple[int, int, int]:
-    """Return how far a named motion rotates the numbers of vertices, triangles and corners."""
+def numbering(name: str, n: int, m: int) -> tuple[Whole, Whole, Whole]:
+    """Return the order of vertices (n,) and triangles (m,) of a named motion, and their turns (m,).
+
+    A row of the order is the place where the surface itself has it; a triangle that comes there is
+    turned by so many corners.
+    """
     if name == UNMOVED or name.endswith(NUMBERS_KEPT):
-        return 0, 0, 0
+        return np.arange(n), np.arange(m), np.zeros(m, dtype=np.int64)
     seed = int.from_bytes(hashlib.sha256(f"numbers {name}".encode()).digest()[:8], "little")
-    vertices, triangles, corners = np.random.default_rng(seed).integers(0, (n, m, 3))
-    return int(vertices), int(triangles), int(corners)
+    rng = np.random.default_rng(seed)
+    vertices, triangles = (np.concatenate(_blocks(rng, count)) for count in (n, m))
+    turns = [np.full(len(block), rng.integers(3)) for block in _blocks(rng, m)]
+    return vertices, triangles, np.concatenate(turns)
+
+
+def _blocks(rng: np.random.Generator, count: int) -> list[Whole]:
+    """Return the numbers up to `count` in blocks of consecutive ones, about as many as each has."""
+    cuts = 1 + rng.choice(count - 1, round(count**0.5) - 1, replace=False) if count > 3 else ()
+    blocks = np.split(np.arange(count), np.sort(np.asarray(cuts, dtype=np.int64)))
+    return [blocks[k] for k in rng.permutation(len(blocks))]
 
 
 def moved(mesh: TriangleMesh, name: str) -> TriangleMesh:
     """Return a moved and renumbered copy of the surface; for :data:`UNMOVED`, a plain copy."""
-    vertices, triangles, corners = numbering(name, mesh.n, mesh.m)
-    F = np.roll((mesh.F + vertices) % mesh.n, (triangles, corners), axis=(0, 1))
-    if name == UNMOVED:
-        V = mesh.V.copy()
-    else:
+    vertices, triangles, turns = numbering(name, mesh.n, mesh.m)
+    number = np.empty(mesh.n, dtype=np.int64)
+    number[vertices] = np.arange(mesh.n)
+    corners = (np.arange(3) + turns[:, None]) % 3
+    F = number[np.take_along_axis(mesh.F[triangles], corners, axis=1)]
+    V = mesh.V[vertices]
+    if name != UNMOVED:
         matrix, shift = motion(name)
-        low, high = mesh.V.min(axis=0), mesh.V.max(axis=0)
+        low, high = V.min(axis=0), V.max(axis=0)
         centre = low + (high - low) / 2
-        V = (mesh.V - centre) @ matrix.T + (centre + float((high - low).max()) * shift)
-    V = np.roll(V, vertices, axis=0)
+        V = (V - centre) @ matrix.T + (centre + float((high - low).max()) * shift)
     V.setflags(write=False)
     F.setflags(write=False)
     return type(mesh).trusted(V, F, mesh.name, mesh.notices)
@@ -105,5 +120,8 @@ def in_first_order(uv: Complex, mesh: TriangleMesh, name: str) -> Complex:
 
     The surface of an atlas, which has a point for each corner, is never renumbered.
     """
-    vertices, _, _ = numbering(name, mesh.n, mesh.m)
-    return np.roll(uv, -vertices)
+    if name.endswith(NUMBERS_KEPT) or name == UNMOVED:
+        return uv
+    placed = np.empty_like(uv)
+    placed[numbering(name, mesh.n, mesh.m)[0]] = uv
+    return placed
