@@ -6,9 +6,10 @@ be right. A stretch changes it by about as much as the stretch itself: far more 
 far less than any table shows.
 
 It is renumbered too: the rows of vertices and of triangles are cut into blocks of random lengths,
-which come in random order, and the corners of the triangles of a block are rotated. A matrix or
-factor that was kept for other numbers is useless, even as a preconditioner, and what was kept by
-the triangles is not found. What was near in memory stays near, and so the work stays the same.
+each of which is moved by another number of places, and the corners of the triangles of a block are
+rotated. A matrix or factor that was kept for other numbers is useless, even as a preconditioner,
+and what was kept by the triangles is not found. What was near in memory stays near, and so the work
+stays the same.
 """
 
 from __future__ import annotations
@@ -32,6 +33,10 @@ UNMOVED = ""
 NUMBERS_KEPT = " (numbers kept)"
 #: What stands for the name of a motion that is drawn when its call begins.
 DRAWN_LATER = "?"
+#: Number of blocks that are permuted, a prime, and how far their ends are moved, in lengths of one.
+#: With five no shift puts a third of the numbers in place; with more, orderings of well-numbered
+#: meshes take longer (`python -m benchmarks renumbering`).
+BLOCKS, JITTER = 5, 0.3
 #: Relative stretch, largest against smallest length; it reveals kept results.
 STRETCH = 1e-6
 #: Largest angle in radians, shift as a share of the surface's size, and relative change of scale;
@@ -91,10 +96,14 @@ def numbering(name: str, n: int, m: int) -> tuple[Whole, Whole, Whole]:
 
 
 def _blocks(rng: np.random.Generator, count: int) -> list[Whole]:
-    """Return the numbers up to `count` in blocks of consecutive ones, about as many as each has."""
-    cuts = 1 + rng.choice(count - 1, round(count**0.5) - 1, replace=False) if count > 3 else ()
-    blocks = np.split(np.arange(count), np.sort(np.asarray(cuts, dtype=np.int64)))
-    return [blocks[k] for k in rng.permutation(len(blocks))]
+    """Return the numbers up to `count` in blocks of consecutive ones, in another order."""
+    if count < 2 * BLOCKS:
+        return [np.array([k]) for k in rng.permutation(count)]
+    cuts = (np.arange(1, BLOCKS) + rng.uniform(-JITTER, JITTER, BLOCKS - 1)) * count / BLOCKS
+    blocks = np.split(np.arange(count), cuts.astype(np.int64))
+    # Each block is moved by another number of places.
+    order = (rng.integers(2, BLOCKS) * np.arange(BLOCKS) + rng.integers(BLOCKS)) % BLOCKS
+    return [blocks[k] for k in order]
 
 
 def moved(mesh: TriangleMesh, name: str) -> TriangleMesh:
