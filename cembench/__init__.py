@@ -119,7 +119,7 @@ __all__ = [
     "Run",
     "Submission",
     "TriangleMesh",
-    "__version__",
+    "__version__",  # noqa: F822 - __getattr__ has it
     "algorithm",
     "benchmark",
     "catalogue",

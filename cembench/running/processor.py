@@ -21,7 +21,7 @@ import psutil
 #: The option of ``prctl`` that makes a process adopt its orphaned descendants.
 _SET_CHILD_SUBREAPER = 36
 #: The state in /proc of a running or runnable thread.
-_RUNS = "R"
+_RUNS = b"R"
 #: CPU seconds that a process may use to start: an interpreter with its libraries.
 STARTING = 1.0
 #: A process has started when so many looks, so many seconds apart, find it asleep; for so long a
@@ -121,8 +121,7 @@ def running_threads(pid: int, but: int = 0) -> int:
             if int(task.name) == but:
                 continue
             with suppress(OSError):
-                state = (task / "stat").read_text().rpartition(")")[2].split()[0]
-                count += state == _RUNS
+                count += (task / "stat").read_bytes().rpartition(b")")[2].split()[0] == _RUNS
     return count
 
 
@@ -164,7 +163,7 @@ def children() -> list[int]:
 
 def _children_of(pid: int) -> list[int]:
     tasks = Path(f"/proc/{pid}/task").iterdir()
-    return [int(child) for task in tasks for child in (task / "children").read_text().split()]
+    return [int(child) for task in tasks for child in (task / "children").read_bytes().split()]
 
 
 def _seconds_of(pid: int) -> float:

@@ -123,7 +123,7 @@ def main(path: Path) -> None:
         limit_memory(job.memory_bytes)
     use_folder(job.answer_file.with_name(PROGRAMS))
     answer = _TASKS[job.task](job)
-    job.answer_file.write_text(answer.model_dump_json())
+    job.answer_file.write_text(answer.model_dump_json(), encoding="utf-8")
 
 
 def end() -> NoReturn:
