@@ -19,9 +19,10 @@ from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+from urllib.parse import quote
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from cembench.core.errors import ParameterError, RegistryError, describe_error
 from cembench.core.names import digest
@@ -196,7 +197,7 @@ class StatedClaim(_Part):
 
     """
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
     quote: str
     place: str
     test: str
@@ -260,7 +261,7 @@ class Paper(_Part):
     @property
     def address(self) -> str:
         """The address that the doi resolves to."""
-        return f"https://doi.org/{self.doi}"
+        return f"https://doi.org/{quote(self.doi, safe='/:;,()+=')}"
 
     @property
     def compared(self) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """A second paper, given as a folder: its report has its tables, pictures and claims."""
 
+import re
 import shutil
 from pathlib import Path
 
@@ -94,3 +95,25 @@ def test_code_of_a_folder_that_is_not_installed_needs_trust(
         cli("report", small_run, "-o", "asked", "--paper", folder)
         assert (cli.folder / "asked/index.html").exists() == reports == (tmp_path / "ran").exists()
     assert cli("report", small_run, "-o", "there", "--paper", folder, "--trust")[0] == 0
+
+
+def test_a_strange_paper_brings_no_html_of_its_own(small_run, tmp_path, quick_drawing):
+    strange = "<img src=x onerror=alert(1)>"
+    about = dict.fromkeys(("title", "authors", "place", "doi", "machine"), f"A {strange} B")
+    claims = [
+        claim.model_copy(
+            update=dict.fromkeys(("plain", "quote", "place", "test", "remark"), strange)
+        )
+        for claim in PAPER.claims
+    ]
+    printed = {
+        number: one.model_copy(update={"title": strange, "caption": strange})
+        for number, one in PAPER.printed.items()
+    }
+    paper = PAPER.model_copy(update=about | {"claims": tuple(claims), "printed": printed})
+    write_report(small_run, tmp_path / "out", "c", paper=paper)
+    for file in (tmp_path / "out").rglob("*.md"):
+        text = file.read_text(encoding="utf-8")
+        assert not re.search(r"(?<!\\)<img", text), file
+    page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert "<img src=x" not in page
