@@ -6,7 +6,7 @@ does so as Python does (``rounds=6``) and, on the command line, as an option (``
 
 from __future__ import annotations
 
-from pathlib import Path
+import os
 from typing import TYPE_CHECKING, Self
 
 from cembench.core import wording
@@ -68,7 +68,10 @@ class CembenchError(Exception):
         It is for messages about what somebody else has made, where other advice is right.
         """
         template, values = self._template or (str(self).replace("{", "{{").replace("}", "}}"), {})
-        shown = {key: one.name if isinstance(one, Path) else one for key, one in values.items()}
+        shown = {
+            key: os.path.basename(one) if isinstance(one, os.PathLike) else one  # noqa: PTH119
+            for key, one in values.items()
+        }
         return wording.in_python(template, shown | {"remedy": ""}).strip()
 
     def reword(self, options: Mapping[str, str]) -> None:
