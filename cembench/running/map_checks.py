@@ -30,6 +30,7 @@ from cembench.conformal.metrics import (
     image_area,
     lost_in_rounding,
 )
+from cembench.core.arrays import Complex
 from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import SAME_ENERGY, Boundary, Fault, FaultKind, Outcome, not_ok
@@ -37,8 +38,6 @@ from cembench.running.map_promises import Promise, faults, remarks
 from cembench.running.quality import quality_notes
 from cembench.running.rigid_motion import UNMOVED, in_first_order, moved
 from cembench.running.sanitized_result import hash_of, outcome_of_error
-
-Complex = NDArray[np.complex128]
 
 #: Largest distance of a vertex, relative to the image's size, between maps that are equal to
 #: rounding, and between maps of two motions.

@@ -21,8 +21,8 @@ from time import monotonic, thread_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.clock import Timing, measure
 from cembench.core.errors import NotThere, ParameterError
 from cembench.core.parameterization import Parameterization
@@ -67,7 +67,6 @@ LONG_CALL = 5.0
 #: In place of a map that is kept elsewhere.
 _NOT_KEPT = np.empty(0, dtype=np.complex128)
 
-Complex = NDArray[np.complex128]
 Call = Callable[[TriangleMesh], tuple[Returned, Timing]]
 
 

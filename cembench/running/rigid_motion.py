@@ -19,13 +19,9 @@ import re
 from os import urandom
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Whole = NDArray[np.int64]
 
 #: Name of the identity motion.
 UNMOVED = ""
@@ -80,7 +76,7 @@ def may_be(name: str, asked: str) -> bool:
     return re.fullmatch(pattern, name) is not None
 
 
-def numbering(name: str, n: int, m: int) -> tuple[Whole, Whole, Whole]:
+def numbering(name: str, n: int, m: int) -> tuple[Indices, Indices, Indices]:
     """Return the order of vertices (n,) and triangles (m,) of a named motion, and their turns (m,).
 
     A row of the order is the place where the surface itself has it; a triangle that comes there is
@@ -95,7 +91,7 @@ def numbering(name: str, n: int, m: int) -> tuple[Whole, Whole, Whole]:
     return vertices, triangles, np.concatenate(turns)
 
 
-def _blocks(rng: np.random.Generator, count: int) -> list[Whole]:
+def _blocks(rng: np.random.Generator, count: int) -> list[Indices]:
     """Return the numbers up to `count` in blocks of consecutive ones, in another order."""
     if count < 2 * BLOCKS:
         return [np.array([k]) for k in rng.permutation(count)]

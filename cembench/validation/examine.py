@@ -9,6 +9,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -43,7 +44,7 @@ from cembench.validation.scaling import (
     sizes,
 )
 from cembench.validation.sizes import keeps_its_quality
-from cembench.validation.solver import Call, Complex, Solver
+from cembench.validation.solver import Call, Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Default baseline for each target.
