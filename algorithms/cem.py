@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
@@ -13,12 +12,11 @@ from cembench.conformal.boundary_iteration import Stop, iterate_boundary, on_cir
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import with_last_resort
+from cembench.core.arrays import Complex
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
-
-Complex = NDArray[np.complex128]
 
 
 @algorithm("cem", title="CEM", target="disk", source="The CEM paper, Algorithm 1")

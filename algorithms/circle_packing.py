@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.discrete_metric import BlockPattern, angle_sums, angles
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -19,9 +19,6 @@ from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Number of earlier steps used for extrapolation, and its largest size in logarithms.
 MEMORY, FARTHEST = 8, 2.0

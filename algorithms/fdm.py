@@ -27,14 +27,13 @@ from cembench.conformal.harmonic import (
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
 from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.planar import polygon_area, signed_areas
+from cembench.core.arrays import Complex
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import keeps_factors
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
-
-Complex = NDArray[np.complex128]
 
 #: Largest modulus of a reflected vertex; one at the centre would go to infinity.
 FARTHEST = 1e8

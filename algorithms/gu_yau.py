@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.balancing import moebius_centred
@@ -22,8 +21,6 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 from .qiem import boundary_on_circle
-
-Real = NDArray[np.float64]
 
 #: The step as a share of the largest stable step of explicit diffusion.
 SHARE = 0.9

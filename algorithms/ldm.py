@@ -20,13 +20,12 @@ from cembench.conformal.moebius import three_point_map
 from cembench.conformal.planar import polygon_area
 from cembench.conformal.spherical import balanced_planar_map
 from cembench.conformal.stereographic import to_plane, to_sphere
+from cembench.core.arrays import Complex
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
-
-Complex = NDArray[np.complex128]
 
 #: Number of vertices nearest to the south pole that are held while the north is corrected.
 HELD = 50

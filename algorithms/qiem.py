@@ -6,7 +6,6 @@ from typing import Annotated
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.balancing import moebius_centred
@@ -18,15 +17,13 @@ from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.planar import fitted_circle, polygon_area
 from cembench.conformal.spherical import balanced_planar_map
 from cembench.conformal.stereographic import to_plane, to_sphere
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 #: The time step: its initial value, its factors after a step and after a failed step, its limit as
 #: a share of its theoretical bound, and the value below which it counts as zero.

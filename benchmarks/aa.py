@@ -275,7 +275,7 @@ def clopper_pearson(hits: int, of: int) -> tuple[float, float]:
 def section(output: Path) -> Section:
     """Return all parts, as far as they were measured."""
     rows = [
-        {"machine": HALVES[half], **json.loads(path.read_text())}
+        {"machine": HALVES[half], **json.loads(path.read_text(encoding="utf-8"))}
         for half in HALVES
         if (path := output / f"{half}.json").is_file()
     ]

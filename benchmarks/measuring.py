@@ -59,7 +59,7 @@ def in_fresh_process(
     arguments_of_process = [function.__module__, function.__qualname__, json.dumps(arguments)]
     environment = {k: v for k, v in for_measuring(threads).items() if k not in without}
     command = [sys.executable, "-m", "benchmarks.measuring", *arguments_of_process]
-    run = subprocess.run(command, capture_output=True, text=True, env=environment)
+    run = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment)
     if run.returncode:
         raise SystemExit(run.stderr)
     return json.loads(run.stdout)

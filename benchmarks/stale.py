@@ -28,7 +28,8 @@ def made_tables() -> list[str]:
     pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
     tables = []
     for page in pages:
-        for study in re.findall(r"<!-- made by benchmarks/(\w+)\.py -->", page.read_text()):
+        text = page.read_text(encoding="utf-8")
+        for study in re.findall(r"<!-- made by benchmarks/(\w+)\.py -->", text):
             tables.append(f"{page.relative_to(ROOT).as_posix()} {study}")
     return tables
 

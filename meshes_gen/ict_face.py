@@ -12,6 +12,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Real
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.soup import Soup
@@ -20,7 +21,6 @@ from cembench.registry import surface_family
 
 from .ict_model import EXPRESSIONS, IDENTITIES, FaceModel, load_model
 
-Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Part = Literal["face", "narrow", "head", "disk"]
 

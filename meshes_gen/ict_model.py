@@ -22,13 +22,13 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import DatasetError, MeshError, RecordError
 from cembench.core.wording import Advice
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.formats import obj
 
-Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 #: Environment variable for the folder of the model's files.

@@ -12,7 +12,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
+
 Faces = NDArray[np.int64]
 
 

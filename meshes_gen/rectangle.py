@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex
 
 
 def rectangle_grid(faces: int, aspect: float) -> tuple[Complex, NDArray[np.int64]]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.boundary_energy import in_gauge
@@ -13,6 +12,7 @@ from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.last_resort import with_last_resort
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -20,8 +20,6 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 from .yamabe import YamabeBoundary
-
-Real = NDArray[np.float64]
 
 #: Largest ratio of boundary lengths; above it the boundary is too crowded.
 CROWDED = 1e13

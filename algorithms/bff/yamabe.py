@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.gauss_bonnet import vertex_curvatures
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.mesh.triangle_mesh import DiskMesh
-
-Real = NDArray[np.float64]
 
 
 class YamabeBoundary:

@@ -12,9 +12,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Indices = NDArray[np.int64]
+from cembench.core.arrays import Indices
 
 #: No crossing: a path begins or ends at a vertex.
 END = -1

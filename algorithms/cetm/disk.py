@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.discrete_metric import angle_sums
@@ -13,6 +12,7 @@ from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, middle_triangle, moved_to_gauge
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.side_lengths import side_lengths
@@ -22,10 +22,6 @@ from cembench.registry import algorithm
 
 from .flat_metric import FlatMetric, flat_metric
 from .free import cross_ratio_change
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: Number of boundary vertices that are tried, from the mean vertex outward.
 TRIED = 4

@@ -14,13 +14,10 @@ from cembench.conformal.discrete_metric import (
     half_cotangents_of,
     scaled,
 )
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import Cholesky
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: A step is taken if the energy's upward slope at its end is at most this share of the slope at its
 #: start: the energy is convex, so its minimum along the step is then near the end or beyond.

@@ -17,6 +17,7 @@ from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.laplacian import laplacian, laplacian_of_weights
 from cembench.conformal.last_resort import with_last_resort
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -31,9 +32,6 @@ from .triangle_map import K, disk_of_triangle
 if TYPE_CHECKING:
     from .overlay import RefinedMap
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: The rows of a matrix are ordered anew after flips of more than this share of the triangles.
 FEW = 0.0005

@@ -18,21 +18,17 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.gauge import Gauge, gauge_measure, moved_to_gauge
 from cembench.conformal.last_resort import valid_map
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.intrinsic import Triangulation
 from cembench.mesh.triangle_mesh import DiskMesh
 
 from .crossings import END, Crossings
 from .flips import Uniformised, uniformised
 from .triangle_map import disk_of_triangle
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: Where a crossing lies on a given edge and on a flipped one.
 Place = tuple[float, float]

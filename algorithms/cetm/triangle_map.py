@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex
 
 #: sm maps the triangle with corners at K times the cube roots of 1 to the unit disk, K to 1.
 K = 1.7666387502854499

@@ -9,13 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cembench.conformal.boundary_energy import EnergyModel, moebius_descent
+from cembench.core.arrays import Complex
 from cembench.core.clock import phase
-
-Complex = NDArray[np.complex128]
 
 #: Largest step in the unit disk, and the maximal number of steps.
 LEASH, STEPS = 0.05, 5

@@ -180,6 +180,7 @@ class Run:
         *,
         tables: Sequence[AnyPath] = (),
         paper: str | None = None,
+        trust: bool = False,
         verify: bool = False,
         command: str = "",
         jobs: int = 1,
@@ -198,7 +199,10 @@ class Run:
         tables : sequence of paths
             A TOML file that declares more tables and plots.
         paper : str, optional
-            The paper whose tables and claims it has: an installed one, or its folder.
+            The paper whose tables and claims it has: an installed one, or its folder, whose
+            checks.py runs as you.
+        trust : bool
+            Run the checks.py of a paper's folder that is not installed.
         verify : bool
             Recompute the figures of all maps, not just of a sample.
         command : str
@@ -219,7 +223,8 @@ class Run:
         RecordError
             The run has no records, a record or a map is damaged, or the folder cannot be written.
         ParameterError
-            A declaration of a table is wrong, or does not fit the run.
+            A declaration of a table is wrong, or does not fit the run; or a paper's folder has a
+            checks.py and is not trusted.
         RegistryError
             There is no such paper.
 
@@ -229,12 +234,12 @@ class Run:
         from cembench.results.store import Store
         from cembench.results.verify import Depth, sound_records
 
-        asked = find_paper(paper) if paper else None
+        asked = find_paper(paper, trust=trust) if paper else None
         records = sound_records(Store(self.folder), Depth.everything if verify else Depth.sample)
         files = [Path(file) for file in tables]
         words = ["cembench", "report", self.folder, *(["-o", folder] if folder else [])]
         words += [word for file in files for word in ("--tables", file)]
-        words += ["--paper", paper] if paper else []
+        words += ["--paper", paper, *(["--trust"] if trust else [])] if paper else []
         target = Path(folder) if folder else self.folder / "report"
         with reporter.counting() as count:
             return write_report(

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import double_areas
+from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError
 from cembench.mesh.files import read_soup
@@ -27,7 +28,6 @@ from cembench.running.surfaces import (
 )
 
 Ints = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 #: Maximum number of surfaces in a file; one with more pieces is a triangle soup that needs welding.
 MOST = 100

@@ -9,15 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.resample import geometry_image
+from cembench.core.arrays import Complex, Real
 from cembench.core.atomic import write_by, write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: File formats of geometry images.
 IMAGES = (".npy", ".exr", ".png")

@@ -6,13 +6,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cembench.api.components import Shells
 from cembench.api.map_outputs import draw_maps, write_extras
 from cembench.api.write_maps import FileOptions, write_shells, write_together
 from cembench.conformal.atlas import laid_out
+from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
@@ -25,7 +23,6 @@ from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.surfaces import SurfaceFile, file_named, is_generated
 
-Complex = NDArray[np.complex128]
 #: Notices, each with the file it is about.
 Notices = tuple[tuple[Path, Notice], ...]
 

@@ -128,6 +128,8 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
         The place cannot be read, or algorithms are to share processes.
     MissingExtra
         dask is not installed.
+    ClusterError
+        Jobs cannot be submitted from this machine.
 
     """
     if cluster is None:
@@ -136,13 +138,14 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
         raise ParameterError.about(
             "{pairing:'process'} is for runs on this machine; leave it out, or leave {cluster} out."
         )
-    from cembench.running.cluster.connect import MODULES, parse_cluster
+    from cembench.running.cluster.connect import MODULES, check_submits, parse_cluster
 
     if not isinstance(cluster, str):
         require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
         return
     where = parse_cluster(cluster)
     require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
+    check_submits(where)
     if where.is_open:
         reporter.warn(
             f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "

@@ -137,7 +137,7 @@ def read_manifest(folder: Path) -> dict[str, dict[str, str]]:
     if not place.is_file():
         return {}
     try:
-        rows = list(csv.DictReader(place.read_text("utf-8").splitlines(), delimiter="\t"))
+        rows = list(csv.DictReader(place.read_text(encoding="utf-8").splitlines(), delimiter="\t"))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise ParameterError(
             f"{place} cannot be read as a table: {error}. Write it as UTF-8 text with a line a "

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
 from cembench.api.settings import Placement
 from cembench.conformal.atlas import cut_map
 from cembench.conformal.planar import orientations
+from cembench.core.arrays import Complex
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
@@ -24,8 +24,6 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed, to_unit_square
 from cembench.mesh.uvs import uv_of_faces
 from cembench.running.surfaces import SurfaceFile
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

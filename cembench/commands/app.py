@@ -102,7 +102,8 @@ def _first_line(function: str) -> str:
     """Return the first paragraph of the docstring of ``module:name``."""
     module, _, name = function.partition(":")
     spec = find_spec(module)
-    source = "" if spec is None or spec.origin is None else Path(spec.origin).read_text("utf-8")
+    file = None if spec is None or spec.origin is None else Path(spec.origin)
+    source = "" if file is None else file.read_text(encoding="utf-8")
     begin = re.search(rf'^ *def {name}\(.*?"""(.*?)(?:\n\n|""")', source, re.M | re.S)
     return " ".join(begin[1].split()) if begin else ""
 

@@ -100,6 +100,7 @@ def _named_value(shown: Callable[[Any], str | None], ctx: Any) -> str | None:
 @contextmanager
 def ending() -> Iterator[None]:
     """Turn any exception in this block into a message and an exit code."""
+    _open_closed_streams()
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError):  # a replaced stream may not support this
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
@@ -117,6 +118,21 @@ def ending() -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _open_closed_streams() -> None:
+    """Let output go nowhere where it was closed, as some supervisors do.
+
+    The next file to be opened would otherwise take the number of the stream, and its output.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            handle = os.open(os.devnull, os.O_RDWR)
+            if handle != number:
+                os.dup2(handle, number)
+                os.close(handle)
+            mode = "w" if number else "r"
+            setattr(sys, name, os.fdopen(number, mode, encoding="utf-8", closefd=False))
 
 
 def _end_of(error: Exception) -> NoReturn:
@@ -163,6 +179,7 @@ def _kept(trace: str) -> str:
                 prefix="cembench-fault-",
                 suffix=".txt",
                 delete=False,
+                encoding="utf-8",
                 errors="backslashreplace",
             ) as file,
         ):

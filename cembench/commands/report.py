@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import typer
 
 from cembench.api import benchmark
 from cembench.commands.app import app
@@ -33,12 +36,23 @@ MOST_DRAWING = 2
 )
 def report(call: Call, run: Run = DEFAULT_RUN, *, as_json: Json = False) -> None:
     """Print the four tables and the verdicts."""
+    _ask_for_trust(call)
     written = call(benchmark.Run(run), jobs=drawing_jobs(), reporter=SHOWN)
     folder = call.keywords["folder"] or run / "report"
     if as_json:
         print_json(summary(written, folder))
     else:
         show_report(written, folder)
+
+
+def _ask_for_trust(call: Call) -> None:
+    """Ask at a terminal whether the code in the folder of a paper may run."""
+    from cembench.results.papers import code_of
+
+    paper = call.keywords["paper"]
+    code = code_of(paper) if paper and not call.keywords["trust"] and sys.stdin.isatty() else None
+    if code is not None:
+        call.keywords["trust"] = typer.confirm(f"{code} will run with your rights. Run it?")
 
 
 def drawing_jobs() -> int:

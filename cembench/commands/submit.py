@@ -132,8 +132,9 @@ def publish(
     def progress(words: str, done: int, total: int) -> None:
         err.print(f"[{done}/{total}] {words}", markup=False, style="dim")
 
-    with accepted(sent) as unpacked:
-        signers = check_signed([*own, *unpacked], require_signed)
+    with accepted(sent, require_signed) as unpacked:
+        signers = check_signed(own, require_signed)
+        signers |= {folder: one.signer for folder, one in unpacked.items() if one.signer}
         site = write_site([*own, *unpacked], output, progress, signers)
     if as_json:
         print_json({"output": str(output), "runs": [asdict(one) for one in site]})

@@ -6,11 +6,9 @@ Baden, Crane & Kazhdan 2018, Moebius registration, Algorithm 1.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.core.errors import AlgorithmFailed
-
-Real = NDArray[np.float64]
 
 #: Newton steps are cut to this length; a step of length 1 would map the sphere to a point.
 LONGEST_STEP = 0.5

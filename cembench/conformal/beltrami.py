@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import double_areas, half_cotangents, laplacian_of_weights
 from cembench.conformal.planar import signed_areas
+from cembench.core.arrays import Complex
 from cembench.core.blocks import in_blocks
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-
-Complex = NDArray[np.complex128]
 
 #: A triangle with 1 - abs(mu) below this is collapsed: its coefficient has no correct digits.
 COLLAPSED = 1e-8

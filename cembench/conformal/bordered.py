@@ -15,6 +15,7 @@ from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.planar import polygon_area
 from cembench.conformal.ring_order import ring_pays
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky, shows_trailing_block
@@ -23,8 +24,6 @@ from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.triangular import triangle_solved
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 T = TypeVar("T", bound=np.generic)
 
 

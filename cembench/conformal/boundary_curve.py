@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex, Real
 from cembench.core.errors import AlgorithmFailed
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 def closed_curve(lengths: Real, turns: Real) -> tuple[Complex, float]:

@@ -10,11 +10,10 @@ from numpy.typing import NDArray
 
 from cembench.conformal.gauge import middle_triangle
 from cembench.conformal.planar import backward_arcs, polygon_area
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 #: What ends CEM's iteration: a step that does not lower E_C by at least the tolerance, or one that
 #: changes it by less, whichever way.
 Stop: TypeAlias = Literal["drop", "change"]

@@ -10,13 +10,10 @@ import math
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.boundary_energy import MODES
+from cembench.core.arrays import Complex, Real
 from cembench.linear_algebra.cholesky import Cholesky
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: A vertex stands for the piece of boundary between its second neighbours.
 NEIGHBOURS = 2

@@ -13,12 +13,9 @@ from itertools import combinations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex, Real
 from cembench.core.errors import AlgorithmFailed
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Powers about each centre are doubled until the values on the circles are right to this, or until
 #: there are so many unknowns.

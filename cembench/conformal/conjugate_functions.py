@@ -16,12 +16,12 @@ from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import HarmonicExtension
 from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.triangle_mesh import HoledMesh
 
-Real = NDArray[np.float64]
 Loop = NDArray[np.int64]
 
 

@@ -8,10 +8,9 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.triangular import triangle_solved, triangle_times
-
-Real = NDArray[np.float64]
 
 
 class DirichletToNeumann:

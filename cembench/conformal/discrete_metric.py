@@ -10,10 +10,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.mesh.gluing import edges_of_half_edges
-
-Real = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Half the cotangent of 60 degrees, used for lengths that form no triangle.
 REGULAR = 0.5 / np.sqrt(3)

@@ -12,16 +12,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.boundary_energy import EnergyModel
 from cembench.conformal.circle_domain import LEAST_SHARE, BoundaryLoops, CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.patches import disk_patch
 from cembench.conformal.planar import backward_arcs, polygon_area
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex, Real
 
 #: A start's radius as a share of the distance to its neighbours' centres or the outer circle.
 ROOM = 0.45

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.folds import interior_without_folds, without_folds
 from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_triangles, image_area
+from cembench.core.arrays import Complex
 from cembench.core.clock import phase
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-
-Complex = NDArray[np.complex128]
 
 #: A repair that multiplies one of these metrics by more is rejected. The mean angle error flatters
 #: a folded map, since a reflected triangle has the right angles; E_C does not.

@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.planar import backward_arcs, folded_triangles, winding_words
 from cembench.conformal.untangling import untangled
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Gap between boundary vertices that changed places, in radians: just enough to be distinct in
 #: doubles.

@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import double_areas
+from cembench.core.arrays import Complex, Real
 from cembench.core.blocks import in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Maximal number of Newton steps to a gauge, and the tolerance of the mean.
 GAUGE_STEPS, GAUGE_ACCURACY = 200, 1e-12

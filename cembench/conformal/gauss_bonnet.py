@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.metrics import corner_angles
+from cembench.core.arrays import Real
 from cembench.mesh.triangle_mesh import DiskMesh
-
-Real = NDArray[np.float64]
 
 
 def vertex_curvatures(mesh: DiskMesh) -> Real:

@@ -19,13 +19,11 @@ from cembench.conformal.boundary_modes import InverseByModes
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.ring_order import ENTRIES, OPERATIONS_AN_ENTRY
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky, keeps_factors
 from cembench.linear_algebra.lower_triangle import permuted_lower
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Shorter boundaries are always kept last: their dense triangle is small, and serves any step.
 LEAST_BOUNDARY = 500

@@ -13,11 +13,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.mesh.flips import Independence, area_of_sides, distance_across
 from cembench.mesh.gluing import opposite_edge_ends, partners
-
-Real = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: An edge is not Delaunay if its cotangents sum to less than minus this share of their size.
 ROUNDING = 1e-10

@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import corner_products
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.work import count_analysis, count_columns, count_factorisation
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 
 def mean_value_weights(V: Real, F: Indices) -> scipy.sparse.csr_array:

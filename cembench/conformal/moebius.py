@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

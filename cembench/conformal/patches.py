@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
+from cembench.core.arrays import Real
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
-Real = NDArray[np.float64]
 Loop = NDArray[np.int64]
 
 #: Height of a fan's triangle, as a share of its base, below which it has no area.

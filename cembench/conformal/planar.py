@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.blocks import in_blocks
-
-Complex = NDArray[np.complex128]
 
 #: The sign of an area computed in doubles is certain if it exceeds this share of its terms
 #: (Shewchuk 1997, the filter of `orient2d`), and the terms do not underflow.

@@ -7,14 +7,10 @@ differences of the gradients seen so far (limited-memory BFGS; Nocedal 1980).
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cembench.conformal.boundary_energy import ROUNDING, EnergyModel, Minimum, in_gauge
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-
-Real = NDArray[np.float64]
 
 #: With more steps than this the boundary's dense triangle would have been cheaper.
 MOST_STEPS = 8

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial import Delaunay
 
+from cembench.core.arrays import Complex, Real
 from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
 from cembench.mesh.defects import degenerate
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
-Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 Grid = Literal["square", "disk"]
 
 #: Allowed numbers of samples along a side.

@@ -11,8 +11,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
-
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex
 
 
 def balanced_planar_map(

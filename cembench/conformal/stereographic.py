@@ -12,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex
+
 Pole = Literal["north", "south"]
 
 

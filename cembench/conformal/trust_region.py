@@ -9,9 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
+
 Linear = Callable[[Real], Real]
 
 

@@ -21,13 +21,10 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import corner_products
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: Maximal number of Newton steps; five to thirty are enough if it succeeds.
 STEPS = 60

@@ -6,6 +6,7 @@ does so as Python does (``rounds=6``) and, on the command line, as an option (``
 
 from __future__ import annotations
 
+import os
 from typing import TYPE_CHECKING, Self
 
 from cembench.core import wording
@@ -60,6 +61,18 @@ class CembenchError(Exception):
         error = cls(wording.in_python(template, values))
         error._template = (template, values)
         return error
+
+    def without_remedy(self) -> str:
+        """Return the message without its template's `remedy`, and with files named without folders.
+
+        It is for messages about what somebody else has made, where other advice is right.
+        """
+        template, values = self._template or (str(self).replace("{", "{{").replace("}", "}}"), {})
+        shown = {
+            key: os.path.basename(one) if isinstance(one, os.PathLike) else one  # noqa: PTH119
+            for key, one in values.items()
+        }
+        return wording.in_python(template, shown | {"remedy": ""}).strip()
 
     def reword(self, options: Mapping[str, str]) -> None:
         """Name arguments as options in the message; `options` has the names that are irregular."""

@@ -36,7 +36,9 @@ _LONGEST_HEADER = 10_016
 
 def damaged(path: Path, what: str, why: object) -> RecordError:
     """Return the error for a file with unexpected content."""
-    return RecordError(f"{path} is not {what}: {why}. {REMEDY}")
+    return RecordError.about(
+        "{path} is not {what}: {why}. {remedy}", path=path, what=what, why=why, remedy=REMEDY
+    )
 
 
 #: Errors of file system calls; ValueError is raised for an impossible file name.

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
 #: Viewing directions if y is up, and if z is up: faces look along +z, and along -y.

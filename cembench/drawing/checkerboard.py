@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
+
 Ints = NDArray[np.int64]
 
 #: Parts along the side of a divided square; odd, so that corners keep their colour.

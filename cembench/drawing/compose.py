@@ -15,10 +15,9 @@ from numpy.typing import NDArray
 from PIL import Image, ImageColor, ImageDraw, ImageFont
 from PIL.PngImagePlugin import PngInfo
 
+from cembench.core.arrays import Picture
 from cembench.drawing.replaceable_pictures import SOFTWARE
 from cembench.drawing.scene import FOLDED
-
-Picture = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)

@@ -17,17 +17,14 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
+from cembench.core.arrays import Complex, Mask, Picture, Real
 from cembench.drawing import scene as look
 from cembench.drawing.checkerboard import FINER, MOST_LEVELS
 from cembench.drawing.rasterizer import Raster, rasterize
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Mask = NDArray[np.bool_]
-Complex = NDArray[np.complex128]
-Picture = NDArray[np.uint8]
 #: Returns the RGB colours (k, 3) or (3,) of a portion of a panel's samples, 0 to 1.
 Colouring = Callable[[Raster], Any]
 

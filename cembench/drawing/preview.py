@@ -15,17 +15,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex, Picture
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.drawing import compose, painter, scene
 from cembench.drawing.checkerboard import FINER
 from cembench.drawing.view_scene import upright
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Complex = NDArray[np.complex128]
-Picture = NDArray[np.uint8]
 
 #: Default width and height in pixels, and the smallest that hold two panels and text.
 SIZE, LEAST = (1280, 752), (240, 150)

@@ -9,7 +9,8 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
+
 Ints = NDArray[np.int64]
 
 #: Candidates (pixels in a triangle's bounding box) that are tested together. This bounds the

@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.planar import signed_areas
+from cembench.core.arrays import Complex, Real
 from cembench.drawing.camera import view_rotation
 from cembench.drawing.checkerboard import FINER, MOST_LEVELS, Checkerboard
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-Real = NDArray[np.float64]
 Ints = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 #: Squares of the coarsest checkerboard across the image.
 SQUARES = 18

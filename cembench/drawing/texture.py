@@ -7,15 +7,13 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
+from cembench.core.arrays import Real
 from cembench.core.errors import RenderError
 from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import DARK, LIGHT
-
-Real = NDArray[np.float64]
 
 #: Side of the checkerboard in pixels, and its number of squares along a side.
 SIDE, SQUARES = 1024, 32

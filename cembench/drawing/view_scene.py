@@ -24,11 +24,9 @@ from scipy.sparse.csgraph import reverse_cuthill_mckee
 from cembench.conformal.beltrami import dilatations
 from cembench.conformal.metrics import angle_errors
 from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.core.arrays import Complex, Real
 from cembench.drawing.camera import view_rotation
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Most triangles of a surface; larger ones are simplified.
 MOST = 50_000

@@ -8,13 +8,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.real_columns import by_real_columns
 from cembench.linear_algebra.triangular import triangle_solved
 from cembench.linear_algebra.work import count_dense
-
-Real = NDArray[np.float64]
 
 
 class DenseCholesky:

@@ -18,13 +18,10 @@ from typing import Any, Self
 
 import numpy as np
 from cvxopt import cholmod, matrix, spmatrix
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.linear_algebra.orderings import as_permutation, minimum_degree, set_options
 from cembench.linear_algebra.supernodes import CAPSULE, FactorStructure, Supernodes, held_factor
-
-Real = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 # Codes of `cholmod.solve`: three of its steps.
 _FORWARD, _BACKWARD, _PERMUTE_BACK = 4, 5, 8

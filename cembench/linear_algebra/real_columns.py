@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
 
 
 def by_real_columns(linear: Callable[[Real], Any], b: NDArray[Any]) -> NDArray[Any]:

@@ -6,9 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
 
 #: Up to this many columns, BLAS is faster column by column: its block routines copy the triangle.
 _FEW = 4

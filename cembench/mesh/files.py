@@ -8,6 +8,7 @@ libraries read in a process whose memory is bounded. Polygons are cut into trian
 
 from __future__ import annotations
 
+import codecs
 import os
 import stat
 from collections.abc import Callable, Sequence
@@ -162,6 +163,11 @@ def _check_file(path: Path) -> None:
         )
     if status.st_size == 0:
         raise MeshError("the file is empty (0 bytes). Export or download it again.")
+    with path.open("rb") as file:
+        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            raise MeshError(
+                "it is text in UTF-16, as `>` of Windows PowerShell 5 writes it. Save it as UTF-8."
+            )
 
 
 def read_mesh(

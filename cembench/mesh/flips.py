@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from cembench.core.arrays import Indices, Real
 
 
 class Independence:

@@ -12,11 +12,9 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices
 from cembench.mesh.topology import half_edges
-
-Indices = NDArray[np.int64]
 
 #: Places a vertex has in a table of the edges to later vertices, about three on average.
 SLOTS = 8

@@ -9,15 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.flips import Independence, distance_across
 from cembench.mesh.gluing import twins_of_half_edges
 from cembench.mesh.side_lengths import side_lengths
-
-Real = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: An edge is flipped if the cosines of its opposite angles sum to less than this.
 SURELY = -1e-10

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex
 
 #: Allowed distance from the unit circle of the boundary of a map onto the disk.
 _ROUNDING = 1e-9

@@ -207,7 +207,8 @@ def _turned(F: Indices) -> tuple[Indices, Indices]:
 
 def _read_text(path: Path, *, uv: bool) -> Soup:
     """Read two numbers per line, for each vertex or for each corner."""
-    rows = [line.replace(",", " ").split() for line in path.read_text("latin-1").splitlines()]
+    lines = path.read_text(encoding="latin-1").splitlines()
+    rows = [line.replace(",", " ").split() for line in lines]
     rows = [row for row in rows if row and not row[0].startswith("#")]
     bad = next((row for row in rows if len(row) != 2), None)
     if bad is not None or not rows:

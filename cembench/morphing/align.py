@@ -16,12 +16,11 @@ from cembench.conformal.gauge import gauge_measure, moved_to_gauge
 from cembench.conformal.moebius import Moebius
 from cembench.conformal.planar import folded_triangles, signed_areas
 from cembench.conformal.resample import interpolated, locate
+from cembench.core.arrays import Complex, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
 
-Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 #: Polar grid on which two surfaces are compared: numbers of radii and directions.
 RADII, DIRECTIONS = 24, 256

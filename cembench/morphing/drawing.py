@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.core.errors import ParameterError
 from cembench.drawing.camera import viewpoints
 from cembench.drawing.painter import draw_clay
@@ -14,7 +15,6 @@ from cembench.drawing.scene import FILL
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.morphing.path import position
 
-Real = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
 
 #: The available views, in the order of the paper's video.

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
 
-Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
 
 #: The order of two landmarks about the first one is certain if their directions differ by this many

@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.metrics import dilatations, dirichlet_energy, flipped_triangles
+from cembench.core.arrays import Real
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.registration import Registration
 from cembench.results.exhibits import ExhibitTable
 
 Ints = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 #: Number of random points per surface, besides the vertices, for distances.
 SAMPLES = 50_000

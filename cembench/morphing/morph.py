@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.resample import interpolated, locate
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.morphing.align import aligned, best_turn, centred, vertex_areas
 from cembench.morphing.landmarks import Landmarks, check_order
 from cembench.morphing.metrics import registration_metrics, size_of
 from cembench.morphing.path import largest_acceleration, largest_step, pose_of, position
 from cembench.morphing.registration import LAMBDA, REACH, Registration, register
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 #: How the later surfaces are moved before the path is drawn through them.
 Pose = Literal["similarity", "rigid", "keep"]

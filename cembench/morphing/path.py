@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
 
 
 def spline(surfaces: int) -> CubicSpline:

@@ -22,14 +22,13 @@ from scipy import sparse
 
 from cembench.conformal.laplacian import by_rows, cotangent_laplacian, laplacian
 from cembench.conformal.planar import signed_areas
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 
-Complex = NDArray[np.complex128]
 Ints = NDArray[np.int64]
-Real = NDArray[np.float64]
 
 #: Default weight of the landmarks in (34); E_D of a disk is about pi.
 LAMBDA = 100.0

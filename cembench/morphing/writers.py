@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core import atomic
+from cembench.core.arrays import Real
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.files import write_mesh
@@ -20,7 +21,6 @@ from cembench.morphing.drawing import draw_film
 if TYPE_CHECKING:
     from cembench.morphing.morph import Morph
 
-Real = NDArray[np.float64]
 Pictures = NDArray[np.uint8]
 
 #: Frames per second.

@@ -12,6 +12,7 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from cembench.core.errors import ParameterError
+from cembench.results.expressions import with_words
 
 
 class Declaration(BaseModel):
@@ -88,7 +89,7 @@ def filled(text: str, known: Mapping[str, Any]) -> str:
 
     """
     try:
-        return text.format_map(known)
+        return with_words(text, **known)
     except (LookupError, ValueError, TypeError, AttributeError) as error:
         names = ", ".join(sorted(map(str, known)))
         raise ParameterError(

@@ -42,6 +42,7 @@ from cembench.report.plot_rows import (
 )
 from cembench.report.plots import Axis, Kind, Plot, PlotPanel, PlotSeries, Point
 from cembench.results.columns import COLUMNS
+from cembench.results.expressions import with_words
 from cembench.results.frame import evaluate
 
 if TYPE_CHECKING:
@@ -234,7 +235,7 @@ def declared_plot(
         "surface": surface.full_title if surface else "",
         "counts": ", ".join(f"{d.n} of {len(evidence.surfaces)} ({d.panel.of})" for d in drawn),
         "panels": "; ".join(one.about for one in drawn),
-        "left_out": spec.left_out.format(", ".join(left_out)) if left_out else "",
+        "left_out": with_words(spec.left_out, ", ".join(left_out)) if left_out else "",
     }
     return Plot(
         called or spec.figure.lower().replace(" ", "-") or name,

@@ -19,6 +19,7 @@ from cembench.report.content.inspection import BIN, Inspection, angles_of
 from cembench.report.document import Column, Table, Value, entry, missing, words
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.plots import PlotSeries, Point, through
+from cembench.results.expressions import with_words
 from cembench.results.multiple_testing import geometric
 from cembench.results.papers import Paper
 from cembench.results.power_law import FEWEST, fit
@@ -116,7 +117,9 @@ def printed(evidence: Evidence, *_: Any) -> pd.DataFrame:
             row |= {"measured": model in there, "ok": True, "printed": True}
             for table, about in paper.printed.items():
                 for one in about.figures:
-                    value = paper.tables[table].get(model, {}).get(one.printed.format(algorithm))
+                    value = (
+                        paper.tables[table].get(model, {}).get(with_words(one.printed, algorithm))
+                    )
                     row |= {one.column: value if one.only in ("", algorithm) else None}
                     row |= {f"{one.column}_table": table}
             rows.append(row)

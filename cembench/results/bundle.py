@@ -5,10 +5,10 @@
     ro-crate-metadata.json     who measured what with which software, and the hash of every file
     records/ environments/     as in a run's folder (:mod:`cembench.results.store`)
     maps/ meshes/              where maps are sent
-    signature                  of these files, if the run was signed for it
+    signature                  of all these files, metadata included, if the run was signed for it
 
-Nothing in an archive is trusted: it may hold these names and no others, regular files of bounded
-size, and each file must have the hash that the metadata gives it.
+Nothing in an archive is trusted: it may hold these names and no others, regular files whose sizes
+are bounded before one is read, and each must have the hash that the metadata gives it.
 """
 
 from __future__ import annotations
@@ -31,21 +31,26 @@ from urllib.parse import quote, unquote
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import RecordError
-from cembench.core.loading import damaged, files_in, is_there, read_bytes
+from cembench.core.loading import files_in, is_there, read_bytes
 from cembench.core.names import distinct_slugs
 from cembench.results.machines import machine_of, machine_of_record
 from cembench.results.records import Record
-from cembench.results.run_folder import SIGNATURE
+from cembench.results.run_folder import METADATA, SIGNATURE
 from cembench.results.signing import signature_of, signer
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
 
 #: How the file of a bundle ends.
 SUFFIX = ".zip"
-#: The file of metadata, and the version of RO-Crate that it follows.
-METADATA, ROCRATE = "ro-crate-metadata.json", "https://w3id.org/ro/crate/1.1"
-#: At most this many files, and bytes once unpacked: of the archive and of each archive of arrays.
+#: The version of RO-Crate that the metadata follow.
+ROCRATE = "https://w3id.org/ro/crate/1.1"
+#: At most this many files, and bytes once unpacked, the arrays in archives of arrays too.
 MOST_FILES, MOST_BYTES = 100_000, 2 * 2**30
+#: At most this many bytes of one file of text, which takes twenty times as many when it is read.
+MOST_TEXT = 2**24
+#: Nor may what is unpacked have more bytes than this many times those of the bundle, and a file of
+#: text: records are compressed to a quarter, and maps less.
+MOST_TIMES = 20
 #: What an archive may hold.
 _NAMES = re.compile(
     rf"(records|environments)/[^/\\:]+\.json|(maps|meshes)/[^/\\:]+\.npz|{METADATA}|{SIGNATURE}"
@@ -141,14 +146,15 @@ def pack(
 
     """
     files = _contents(run, surfaces if maps else None)
-    if key is not None:
-        files[SIGNATURE] = signature_of(files, key)
     about = {"name": path.stem, "licence": licence, "author": author}
     crate = {"@context": _CONTEXT, "@graph": _crate(run, files, about, surfaces)}
+    files[METADATA] = json.dumps(crate, indent=1).encode()
+    if key is not None:
+        files[SIGNATURE] = signature_of(files, key)
     with tempfile.TemporaryDirectory(prefix="cembench-") as folder:
         draft = Path(folder) / path.name
         with zipfile.ZipFile(draft, "w", zipfile.ZIP_DEFLATED) as archive:
-            for name, content in {**files, METADATA: json.dumps(crate, indent=1).encode()}.items():
+            for name, content in files.items():
                 # Of a fixed date: equal runs give equal bytes.
                 archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
         with unpacked([draft]) as submissions:
@@ -290,9 +296,11 @@ def is_bundle(place: Path) -> bool:
 
 
 @contextmanager
-def accepted(paths: Sequence[Path]) -> Iterator[list[Path]]:
-    """Unpack bundles into temporary folders; raise :class:`RecordError` if one is refused."""
-    with unpacked(paths) as submissions:
+def accepted(
+    paths: Sequence[Path], signers: Path | None = None
+) -> Iterator[dict[Path, Submission]]:
+    """Unpack bundles as :func:`unpacked`; raise :class:`RecordError` if one is refused."""
+    with unpacked(paths, signers) as submissions:
         refused = [f"  {one.name}: {one.faults[0]}" for one in submissions.values() if one.faults]
         if refused:
             raise RecordError(
@@ -300,7 +308,7 @@ def accepted(paths: Sequence[Path]) -> Iterator[list[Path]]:
                 + "\n".join(refused)
                 + "\nLeave them out; `cembench submissions check` lists all that is wrong."
             )
-        yield list(submissions)
+        yield submissions
 
 
 @contextmanager
@@ -323,7 +331,7 @@ def unpacked(
                 submissions[folder], records[name] = _checked(name, path, folder)
                 if signers is not None and submissions[folder].accepted:
                     submissions[folder] = replace(
-                        submissions[folder], signer=signer(folder, signers)
+                        submissions[folder], signer=signer(folder, signers, path.name)
                     )
             except RecordError as error:
                 about = submissions.get(folder, Submission(name))
@@ -345,18 +353,21 @@ def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[
         It is no bundle, or holds what must not be unpacked: nothing is then.
 
     """
+    again = "Ask its sender to pack it again, with `cembench submit`, or leave it out."
     try:
+        most = min(MOST_BYTES, MOST_TEXT + MOST_TIMES * path.stat().st_size)
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
-            for what in _unsafe(members):
-                raise RecordError(
-                    f"{path} was not unpacked: {what}. Bundles are made by `cembench submit`; ask "
-                    "its sender for another."
-                )
+            for what in _unsafe(members, most):
+                raise RecordError(f"{path} was not unpacked: {what}. {again}")
             archive.extractall(folder, members)
     except (OSError, zipfile.BadZipFile, EOFError, ValueError, RuntimeError, zlib.error) as error:
-        raise damaged(path, "a bundle", error) from error
-    faults = [*_other_files(folder, [member.filename for member in members]), *_large(folder)]
+        raise RecordError(f"{path} is not a bundle: {error}. {again}") from error
+    try:
+        names = [member.filename for member in members]
+        faults = [*_other_files(folder, names), *_large(folder, most)]
+    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        faults = [f"{METADATA} in {path} is not metadata of a bundle: {error}. {again}"]
     if faults:
         return Submission(name, tuple(faults)), ()
     store = Store(folder)
@@ -378,15 +389,17 @@ def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[
     return Submission(name, tuple(faults), count, named, maps), verified.records
 
 
-def _unsafe(members: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
+def _unsafe(members: Sequence[zipfile.ZipInfo], most: int) -> Iterator[str]:
     """Yield why an archive must not be unpacked; only its list was read."""
     if len(members) > MOST_FILES:
         yield f"it holds {len(members):,} files, of at most {MOST_FILES:,}"
-    if (size := sum(member.file_size for member in members)) > MOST_BYTES:
-        yield f"its files have {size:,} bytes, of at most {MOST_BYTES:,}"
+    if (size := sum(member.file_size for member in members)) > most:
+        yield f"its files have {size:,} bytes, of at most {most:,}"
     names: set[str] = set()
     for member in members:
         mode, name = member.external_attr >> 16, member.filename
+        if not name.endswith(".npz") and member.file_size > MOST_TEXT:
+            yield f"{name!r} has {member.file_size:,} bytes, of at most {MOST_TEXT:,}"
         if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
             yield f"{name!r} is a link or not a regular file"
         if not _NAMES.fullmatch(name) or name != member.orig_filename or not name.isprintable():
@@ -401,26 +414,30 @@ def _unsafe(members: Sequence[zipfile.ZipInfo]) -> Iterator[str]:
 
 def _other_files(folder: Path, names: Sequence[str]) -> Iterator[str]:
     """Yield how the files differ from what the metadata says of them."""
+    if METADATA not in names:
+        raise ValueError("it is missing")
     stated = _hashes(folder / METADATA)
-    for name in sorted({*stated, *names} - {METADATA}):
+    for name in sorted({*stated, *names} - {METADATA, SIGNATURE}):
         if name not in stated:
             yield f"{name} is not in {METADATA}"
         elif name not in names:
             yield f"{name} is missing"
-        elif hashlib.sha256((folder / name).read_bytes()).hexdigest() != stated[name]:
+        elif _sha256(folder / name) != stated[name]:
             yield f"{name} does not have the SHA-256 that {METADATA} gives it"
 
 
+def _sha256(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def _hashes(path: Path) -> dict[str, Any]:
-    try:
-        graph = json.loads(read_bytes(path, path.parent))["@graph"]
-        files = [entity for entity in graph if entity["@type"] == "File"]
-        return {unquote(entity["@id"]): entity["sha256"] for entity in files}
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
-        raise damaged(path, "metadata of a bundle", error) from error
+    graph = json.loads(read_bytes(path, path.parent))["@graph"]
+    files = [entity for entity in graph if entity["@type"] == "File"]
+    return {unquote(entity["@id"]): entity["sha256"] for entity in files}
 
 
-def _large(folder: Path) -> Iterator[str]:
+def _large(folder: Path, most: int) -> Iterator[str]:
     """Yield the archives of arrays that declare more than a bundle may hold."""
     for place in (*files_in(folder / "maps", "*"), *files_in(folder / "meshes", "*")):
         try:
@@ -429,8 +446,8 @@ def _large(folder: Path) -> Iterator[str]:
         except zipfile.BadZipFile as error:
             yield f"{place.name} is not an archive of arrays: {error}"
             continue
-        if size > MOST_BYTES:
-            yield f"{place.name} declares {size:,} bytes, of at most {MOST_BYTES:,}"
+        if size > most:
+            yield f"{place.name} declares {size:,} bytes, of at most {most:,}"
 
 
 def implausible(record: Record, hardware_threads: int | None = None) -> Iterator[str]:

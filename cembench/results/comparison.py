@@ -170,8 +170,23 @@ def _pairs(ours: Sequence[Round], theirs: Sequence[Round]) -> list[tuple[Round, 
 def compare(record: Record, reference: Record) -> Comparison | None:
     """Compare a record with the reference on the same surface in the same run.
 
-    None if one of them has no times, or an external program has no solve time.
+    None if one of them has no times, or an external program has no solve time. An algorithm is not
+    called faster while its maps of one surface differ from process to process: what it keeps, and
+    makes different by noise, cannot be told from its work.
     """
+    found = _compared(record, reference)
+    for verdict, faster in (("faster", record), ("slower", reference)):
+        if found is not None and found.verdict == verdict and scatters(faster):
+            return replace(found, verdict="undecided", p=1.0)
+    return found
+
+
+def scatters(record: Record) -> bool:
+    """Whether fresh processes map a surface in different ways, whatever the position of the map."""
+    return any(measured.differs for measured in record.outcome.rounds)
+
+
+def _compared(record: Record, reference: Record) -> Comparison | None:
     ours, theirs = record.outcome.solve_seconds, reference.outcome.solve_seconds
     if ours is None or theirs is None:
         return None

@@ -7,19 +7,18 @@ declaration reads a run and does nothing else; a paper adds the functions of its
 
 from __future__ import annotations
 
-import ast
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
 from math import exp, log
 from statistics import mean
-from types import CodeType, MappingProxyType
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 
 from cembench.core.errors import ParameterError
 from cembench.results.columns import significant
+from cembench.results.expressions import computed, names_in
 from cembench.results.families import (
     average_interval,
     family_means,
@@ -38,10 +37,8 @@ if TYPE_CHECKING:
 _NOTHING: Mapping[str, Any] = MappingProxyType({})
 #: Maximum number of entries that :func:`commonest` names.
 _NAMED = 3
-#: What a value may be asked for: everything else of a column is out of reach.
-_METHODS = frozenset(
-    {"isin", "isna", "notna", "str", "startswith", "endswith", "contains", "abs", "len"}
-)
+#: Maximum number of surfaces of a sign test, which computes with whole numbers of as many bits.
+_MOST_TESTED = 10_000
 
 
 def _count(of: pd.Series) -> int:
@@ -128,6 +125,12 @@ def _rate_interval(of: pd.Series, families: pd.Series) -> str | None:
     return f"{interval.low:.1f} to {interval.high:.1f}" if interval else None
 
 
+def _sign_test(wins: int, losses: int) -> float:
+    if wins + losses > _MOST_TESTED:
+        raise ValueError(f"the sign test is of {_MOST_TESTED:,} surfaces at most")
+    return sign_test(wins, losses)
+
+
 def _percentile(known: Any, q: float) -> float:
     return float(np.percentile(known, q))
 
@@ -167,8 +170,8 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = MappingProxyType(
         "total": lambda of: of.sum(),
         "setting": lambda of, name: of.map(lambda parameters: parameters.get(name)),
         "listed": listed,
-        "significant": significant,
-        "sign_test": sign_test,
+        "significant": lambda number, digits=3: significant(number, min(digits, 17)),
+        "sign_test": _sign_test,
         "len": len,
         "min": min,
         "max": max,
@@ -186,9 +189,8 @@ def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) 
         The expression cannot be read, names something unknown, or fails on this frame.
 
     """
-    code, names = _compiled(expression)
     known = {**FUNCTIONS, **more}
-    for name in names:
+    for name in names_in(expression):
         if name in frame and name not in more:
             known[name] = frame[name]
         elif name not in known:
@@ -197,29 +199,7 @@ def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) 
                 f"{expression!r} names {name!r}; known are the functions "
                 f"{', '.join((*FUNCTIONS, *more))} and the columns {', '.join(columns)}."
             )
-    try:
-        return eval(code, {"__builtins__": {}}, known)
-    except Exception as error:
-        raise ParameterError(f"{expression!r} fails on this run: {error}.") from error
-
-
-@cache
-def _compiled(expression: str) -> tuple[CodeType, tuple[str, ...]]:
-    """Return the code of an expression, and the names in it."""
-    try:
-        tree = ast.parse(expression, mode="eval")
-    except SyntaxError as error:
-        raise ParameterError(f"{expression!r} is no expression: {error.msg}.") from error
-    nodes = list(ast.walk(tree))
-    for node in nodes:
-        if isinstance(node, ast.Attribute) and node.attr not in _METHODS:
-            raise ParameterError(
-                f"{expression!r} asks for {node.attr!r}; allowed are {', '.join(sorted(_METHODS))}."
-            )
-        if isinstance(node, ast.Lambda | ast.ListComp | ast.GeneratorExp | ast.NamedExpr):
-            raise ParameterError(f"{expression!r} is more than an expression over columns.")
-    names = dict.fromkeys(node.id for node in nodes if isinstance(node, ast.Name))
-    return compile(tree, "<declaration>", "eval"), tuple(names)
+    return computed(expression, known)
 
 
 def filled(text: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> str:

@@ -19,12 +19,14 @@ from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import FunctionType, ModuleType
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+from urllib.parse import quote
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from cembench.core.errors import RegistryError, describe_error
+from cembench.core.errors import ParameterError, RegistryError, describe_error
 from cembench.core.names import digest
+from cembench.results.expressions import with_words
 from cembench.results.intervals import DEFAULT_ROUNDS
 from cembench.results.profiles import Profile
 
@@ -196,7 +198,7 @@ class StatedClaim(_Part):
 
     """
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
     quote: str
     place: str
     test: str
@@ -262,7 +264,7 @@ class Paper(_Part):
     @property
     def address(self) -> str:
         """The address that the doi resolves to."""
-        return f"https://doi.org/{self.doi}"
+        return f"https://doi.org/{quote(self.doi, safe='/:;,()+=')}"
 
     @property
     def compared(self) -> tuple[str, ...]:
@@ -347,7 +349,7 @@ class Paper(_Part):
         if number is None or model not in self.tables[number]:
             return None
         figure = next(one for one in self.printed[number].figures if one.column == column)
-        return self.tables[number][model].get(figure.printed.format(algorithm))
+        return self.tables[number][model].get(with_words(figure.printed, algorithm))
 
     def functions(self) -> dict[str, Callable[..., Any]]:
         """Return the public functions of the folder's `checks.py`, by name.
@@ -536,15 +538,19 @@ def _spelled_out(
     """
     try:
         known = {**known, **read.get("numbers", {})}
-        known |= {key: str(text).format_map(known) for key, text in read.get("words", {}).items()}
+        known |= {
+            key: with_words(str(text), **known) for key, text in read.get("words", {}).items()
+        }
         return [
             {
-                key: text.format_map(known) if key in _PROSE and isinstance(text, str) else text
+                key: with_words(text, **known) if key in _PROSE and isinstance(text, str) else text
                 for key, text in one.items()
             }
             for one in map(partial(_with_cases, file, read), _entries(file, read, name))
         ]
-    except (LookupError, ValueError) as error:
+    except ValueError as error:
+        raise _wrong(file, name, str(error)) from error
+    except LookupError as error:
         what = f"{{{error}}} is no word of [words]; known: {', '.join(known) or 'none'}"
         raise _wrong(file, name, what) from error
 
@@ -591,15 +597,26 @@ def _installed(entry: EntryPoint) -> Paper:
     return read_paper(Path(places[0]), entry.module)
 
 
-def find_paper(named: str) -> Paper:
+def find_paper(named: str, *, trust: bool = False) -> Paper:
     """Return the installed paper of this name, or the one in this folder.
+
+    With `trust`, a folder that is not installed may have a checks.py, which runs as the user.
 
     Raises
     ------
     RegistryError
         There is neither, or the folder holds no paper.
+    ParameterError
+        The folder has a checks.py, and is not trusted.
 
     """
+    code = code_of(named)
+    if code is not None and not trust:
+        raise ParameterError.about(
+            "{code} would run with your rights, as part of a paper that is not installed. Read it, "
+            "and add {trust:True} if you trust its authors.",
+            code=code,
+        )
     if named in papers():
         return papers()[named]
     if not Path(named).is_dir():
@@ -609,6 +626,14 @@ def find_paper(named: str) -> Paper:
             "of them, or a folder with a paper.toml."
         )
     return read_paper(Path(named))
+
+
+def code_of(named: str) -> Path | None:
+    """Return the checks.py of a paper's folder that is not installed, if it has one."""
+    code = Path(named) / "checks.py"
+    folders = {paper.folder.resolve() for paper in papers().values()}
+    is_strange = named not in papers() and code.parent.resolve() not in folders
+    return code if is_strange and code.is_file() else None
 
 
 def usual_paper() -> Paper:

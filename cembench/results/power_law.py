@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import inf
 
 import numpy as np
 
@@ -19,24 +20,24 @@ class PowerLaw:
 
     factor: float
     exponent: float
-    error: float
-    n: int
+    error: float = inf
+    n: int = 0
 
     def at(self, x: float) -> float:
         """Return y for this x."""
         return self.factor * x**self.exponent
 
 
-def fit(points: Sequence[tuple[float, float]]) -> PowerLaw | None:
+def fit(points: Sequence[tuple[float, float]], fewest: int = FEWEST) -> PowerLaw | None:
     """Return the power law fitted to the logarithms of points (x, y) by least squares.
 
-    None for fewer than :data:`FEWEST` different x, or where they hardly differ.
+    None for less than `fewest` different x, or where they hardly differ.
 
     >>> law = fit([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
     >>> round(law.exponent, 6), round(law.factor, 6)
     (1.5, 3.0)
     """
-    if len({x for x, _ in points}) < FEWEST:
+    if len({x for x, _ in points}) < fewest:
         return None
     x, y = np.log(np.array(points, dtype=float)).T
     off, n = x - x.mean(), len(x)
@@ -45,5 +46,5 @@ def fit(points: Sequence[tuple[float, float]]) -> PowerLaw | None:
         return None
     exponent = float((off * y).sum()) / spread
     rest = y - y.mean() - exponent * off
-    error = float(np.sqrt((rest**2).sum() / (n - 2) / spread))
+    error = float(np.sqrt((rest**2).sum() / (n - 2) / spread)) if n > 2 else inf
     return PowerLaw(float(np.exp(y.mean() - exponent * x.mean())), exponent, error, n)

@@ -258,6 +258,9 @@ class Round(BaseModel):
     #: Whether a call agreed to rounding with another process's call on the same moved surface;
     #: None if nothing was compared.
     repeated: bool | None = None
+    #: Whether two fresh processes mapped the same moved surface in ways that differ by more than a
+    #: turn, a scale and a shift.
+    differs: bool = False
     #: The median of E_C over the area of the timed maps; None if it was not compared.
     energy: Finite | None = None
     #: For an external program, whose `calls` are the wall clock of its process: its seconds on a

@@ -20,6 +20,8 @@ from cembench.results.records import Cell
 FOLDERS = ("records", "maps", "meshes", "environments", "samples", "exhibits", "others")
 #: Files of a run, without its marker.
 PLAN, LOCK, MACHINES, SIGNATURE = "plan.json", "lock", "machines.json", "signature"
+#: The file of a bundle's metadata: author, licence, and the hash of each file.
+METADATA = "ro-crate-metadata.json"
 #: Adapter for the cells of a plan.
 CELLS = TypeAdapter(list[Cell])
 

@@ -2,7 +2,8 @@
 
 A digest shows that a file was not damaged; a signature shows who vouches for all files of a run.
 It is OpenSSH's (``ssh-keygen -Y``, namespace "cembench"), detached, in ``RUN/signature``, over the
-names and SHA-256 of the files. Whether what the signer measured is true it cannot show.
+names and SHA-256 of the files, those of a bundle with its metadata: author and licence. Whether
+what the signer measured is true it cannot show.
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from pathlib import Path
 from cembench.core.atomic import is_draft, write_bytes
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.loading import check_no_link, is_there, open_file, read_bytes
-from cembench.results.run_folder import PLAN, SIGNATURE
+from cembench.results.run_folder import METADATA, PLAN, SIGNATURE
 from cembench.results.store import Store
 
 _NAMESPACE = "cembench"
@@ -67,7 +68,7 @@ def _message(hashes: Iterable[tuple[str, str]]) -> bytes:
     return json.dumps(sorted(hashes)).encode()
 
 
-def signer(run: Path, allowed: Path) -> str:
+def signer(run: Path, allowed: Path, bundle: str = "") -> str:
     """Return who signed a run: a principal of a file of allowed signers.
 
     Parameters
@@ -77,6 +78,8 @@ def signer(run: Path, allowed: Path) -> str:
     allowed : Path
         Who may sign, as ``man ssh-keygen`` describes under ALLOWED SIGNERS: a line has a name and
         a public key.
+    bundle : str
+        The name of the bundle that the folder was unpacked from, if any.
 
     Raises
     ------
@@ -89,18 +92,23 @@ def signer(run: Path, allowed: Path) -> str:
     if not allowed.is_file():
         raise ParameterError(f"{allowed}, the file of allowed signers, does not exist.")
     contents, path = _contents(run), run / SIGNATURE
+    named = bundle or str(run)
+    command = f"cembench submit RUN -o {bundle} --key KEY" if bundle else f"cembench sign {run}"
     if not is_there(path):
-        raise RecordError(f"{run} is not signed; its measurer can run `cembench sign {run}`.")
+        raise RecordError(f"{named} is not signed; its measurer can run `{command}`.")
     read_bytes(path, run)  # a regular file, and no link
     arguments = ["-f", str(allowed), "-s", str(path)]
     names = _ssh_keygen(["find-principals", *arguments], b"")
     if names is None:
-        raise RecordError(f"{run} is signed by nobody whom {allowed} names.")
+        raise RecordError(
+            f"{named} is signed by nobody whom {allowed} names. Add its measurer there, or leave "
+            "it out."
+        )
     name = names.decode(errors="replace").splitlines()[0]
     if _ssh_keygen(["verify", *arguments, "-I", name], contents) is None:
         raise RecordError(
-            f"{run} was changed after {name} signed it, or the signature is of something else. Get "
-            "the run anew, or have it signed again."
+            f"{named} was changed after {name} signed it, or the signature is of something else. "
+            "Get it anew, or have it signed again."
         )
     return name
 
@@ -118,7 +126,8 @@ def _contents(run: Path) -> bytes:
 
 def _files(run: Path) -> Iterator[Path]:
     """Yield the files of a run that are signed; a link among them is refused."""
-    places = [run / PLAN, *(path for name in _SIGNED for path in (run / name).rglob("*"))]
+    below = [path for name in _SIGNED for path in (run / name).rglob("*")]
+    places = [run / PLAN, run / METADATA, *below]
     for path in places:
         check_no_link(path, run)
         if is_there(path) and not path.is_dir() and not is_draft(path):

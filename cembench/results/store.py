@@ -326,8 +326,11 @@ def read_record(path: Path) -> Record:
     """Return the record in ``RUN/records/NAME``; raise :class:`RecordError` if it is not valid."""
     record = read_model(path, Record, path.parents[1])
     if record.schema_version != SCHEMA_VERSION:
-        raise RecordError(
-            f"{path} is of schema version {record.schema_version}; this cembench reads "
-            f"{SCHEMA_VERSION}. Run again into another folder."
+        raise RecordError.about(
+            "{path} is of schema version {version}; this cembench reads {known}. {remedy}",
+            path=path,
+            version=record.schema_version,
+            known=SCHEMA_VERSION,
+            remedy="Run again into another folder.",
         )
     return record

@@ -95,7 +95,7 @@ def verify(store: Store, depth: Depth) -> Verified:
         try:
             records[file] = read_record(file)
         except RecordError as error:
-            findings.append(Finding(file, Kind.damaged, str(error)))
+            findings.append(Finding(file, Kind.damaged, error.without_remedy()))
         else:
             findings += verify_record(file, records[file])
     for file, record in _chosen(records, depth):
@@ -158,7 +158,7 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
     try:
         uv, mesh = store.uv(cell), store.mesh(cell)
     except RecordError as error:
-        yield Finding(file, Kind.damaged, str(error))
+        yield Finding(file, Kind.damaged, error.without_remedy())
         return
     if uv is None or mesh is None:
         if outcome.metrics:

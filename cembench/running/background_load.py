@@ -60,5 +60,5 @@ def _sum(files: Iterable[Path]) -> int | None:
     counts = []
     for file in files:
         with suppress(OSError, ValueError):
-            counts.append(int(file.read_text()))
+            counts.append(int(file.read_text(encoding="utf-8")))
     return sum(counts) if counts else None

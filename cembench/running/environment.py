@@ -114,7 +114,7 @@ def describe_environment() -> dict[str, Any]:
 
 def _allocator() -> dict[str, str | None]:
     """Return how timed processes and the reference kernel have memory, and large pages."""
-    offered = _OFFERED.read_text() if _OFFERED.exists() else ""
+    offered = _OFFERED.read_text(encoding="utf-8") if _OFFERED.exists() else ""
     chosen = offered.partition("[")[2].partition("]")[0]
     return {
         "settings": for_measuring(1)[ALLOCATOR_VARIABLE],
@@ -134,7 +134,7 @@ def _version(package: str) -> str | None:
 def _cpu_model() -> str:
     info = Path("/proc/cpuinfo")
     if info.exists():
-        for line in info.read_text().splitlines():
+        for line in info.read_text(encoding="utf-8").splitlines():
             if line.startswith("model name"):
                 return line.partition(":")[2].strip()
     return platform.processor() or platform.machine()
@@ -154,6 +154,6 @@ def _git_state() -> dict[str, Any] | None:
 
 def _git(root: Path, *arguments: str) -> str:
     run = subprocess.run(
-        ["git", "-C", str(root), *arguments], capture_output=True, text=True, check=True
+        ["git", "-C", str(root), *arguments], capture_output=True, encoding="utf-8", check=True
     )
     return run.stdout.strip()

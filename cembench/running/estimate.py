@@ -10,10 +10,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import exp, log
-from statistics import mean
+from statistics import geometric_mean
 from typing import Literal
 
+from cembench.results.power_law import PowerLaw, fit
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
@@ -43,18 +43,6 @@ _USUAL_EXPONENT = 1.2
 
 
 @dataclass(frozen=True)
-class PowerLaw:
-    """``factor * faces ** exponent``."""
-
-    factor: float
-    exponent: float
-
-    def at(self, faces: float) -> float:
-        """Return the value for this number of triangles."""
-        return self.factor * faces**self.exponent
-
-
-@dataclass(frozen=True)
 class Estimate:
     """Estimate for a cell: seconds of a call and of all processes, and peak bytes."""
 
@@ -77,7 +65,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     ]
     same = [k for k in known if k[3].mesh_hash == cell.mesh_hash]
     points = [(size, seconds) for size, seconds, _, _ in same or known if seconds]
-    law = fit_power_law(points) if points else _usual_law(cell)
+    law = law_through(points) if points else _usual_law(cell)
     basis: Basis = "recorded" if same else "other sizes" if known else "rough"
     call = law.at(faces)
     peaks = [(size, float(peak)) for size, _, peak, _ in same or known if peak]
@@ -118,17 +106,11 @@ def _bytes_at(faces: float, size: float, peak: float) -> float:
     return peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1)
 
 
-def fit_power_law(points: Sequence[tuple[float, float]]) -> PowerLaw:
-    """Return the power law fitted to the logarithms of (faces, seconds) by least squares."""
-    x = [log(size) for size, _ in points]
-    y = [log(seconds) for _, seconds in points]
-    spread = sum((a - mean(x)) ** 2 for a in x)
-    slope = (
-        sum((a - mean(x)) * (b - mean(y)) for a, b in zip(x, y, strict=True)) / spread
-        if spread > 0.01
-        else _USUAL_EXPONENT
-    )
-    return PowerLaw(exp(mean(y) - slope * mean(x)), slope)
+def law_through(points: Sequence[tuple[float, float]]) -> PowerLaw:
+    """Return the power law fitted to (faces, seconds), with the usual exponent for one size."""
+    faces, seconds = map(geometric_mean, zip(*points, strict=True))
+    usual = PowerLaw(seconds / faces**_USUAL_EXPONENT, _USUAL_EXPONENT)
+    return fit(points, fewest=2) or usual
 
 
 def _usual_law(cell: Cell) -> PowerLaw:

@@ -375,6 +375,8 @@ def _notes(outcome: Outcome) -> tuple[Notice, ...]:
     if differing:
         named = ", ".join(map(str, differing))
         text = f"not deterministic: the same surface got different maps in rounds {named}"
+        if any(r.differs for r in rounds):
+            text += ", by more than their position, so it is not called faster than another"
         notices.append(Notice(NoticeKind.NOT_DETERMINISTIC, text))
     cold = is_cold(rounds)
     if cold is not None:

@@ -30,6 +30,7 @@ from cembench.conformal.metrics import (
     image_area,
     lost_in_rounding,
 )
+from cembench.core.arrays import Complex
 from cembench.core.errors import describe_error
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import SAME_ENERGY, Boundary, Fault, FaultKind, Outcome, not_ok
@@ -37,8 +38,6 @@ from cembench.running.map_promises import Promise, faults, remarks
 from cembench.running.quality import quality_notes
 from cembench.running.rigid_motion import UNMOVED, in_first_order, moved
 from cembench.running.sanitized_result import hash_of, outcome_of_error
-
-Complex = NDArray[np.complex128]
 
 #: Largest distance of a vertex, relative to the image's size, between maps that are equal to
 #: rounding, and between maps of two motions.
@@ -86,6 +85,8 @@ class JudgedCalls(BaseModel):
     repeated: bool | None = None
     #: The largest difference from a known map of the same motion, relative to its size.
     apart: float | None = None
+    #: Whether a turn, a scale and a shift do not explain that difference.
+    differs: bool = False
     #: The median E_C over area of the timed maps; None where it is not compared.
     energy: float | None = None
 
@@ -148,7 +149,7 @@ def judged_calls(
     of :data:`UNMOVED` is the checked one.
     """
     seen, shapes = {checked.uv_hash: UNMOVED}, dict(known)
-    repeated, far, doubtful = None, None, None
+    repeated, far, doubtful, differs = None, None, None, False
     energies: list[float] = []
     for name, motion, uv in maps:
         bits, mine = hash_of(uv), sample(in_first_order(uv, mesh, motion))
@@ -179,6 +180,7 @@ def judged_calls(
             apart = difference(mine, other)
             repeated = repeated is not False and apart <= SAME_MAP
             far = max(far or 0.0, apart)
+            differs |= difference(*_aligned(mine, other)) > SAME_MAP
             if apart <= SAME_MAP and only_energy:
                 wrong = []
         elif only_energy:
@@ -190,7 +192,14 @@ def judged_calls(
             return JudgedCalls(faults=(Fault(kind=FaultKind.OTHER_MAP, detail=message), *wrong))
     typical = median_low(energies) if energies else None
     worse = _far_worse(typical, checked.relative_energy)
-    return JudgedCalls(kept=worse, doubtful=doubtful, repeated=repeated, apart=far, energy=typical)
+    return JudgedCalls(
+        kept=worse,
+        doubtful=doubtful,
+        repeated=repeated,
+        apart=far,
+        differs=differs,
+        energy=typical,
+    )
 
 
 def difference(mine: Complex, other: Complex) -> float:
@@ -212,9 +221,16 @@ def _same_shape(mine: Complex, other: Complex) -> bool:
     """Whether the sample of a map is another one's, turned, scaled and shifted."""
     if mine.shape != other.shape:
         return False
+    a, b = _aligned(mine, other)
+    return bool(a.any()) and difference(a, b) <= SAME_SHAPE
+
+
+def _aligned(mine: Complex, other: Complex) -> tuple[Complex, Complex]:
+    """Return the other map turned, scaled and shifted onto mine, and mine, both about 0."""
+    if mine.shape != other.shape:
+        return mine, other
     a, b = other - other.mean(), mine - mine.mean()
-    turn = np.vdot(a, b) / max(np.vdot(a, a).real, 1e-300)
-    return bool(turn) and difference(turn * a, b) <= SAME_SHAPE
+    return np.vdot(a, b) / max(np.vdot(a, a).real, 1e-300) * a, b
 
 
 def _relative_energy(promise: Promise, mesh: TriangleMesh, uv: Complex) -> float:

@@ -23,12 +23,11 @@ from pydantic import BaseModel, ConfigDict
 from cembench.conformal.atlas import AtlasFigures, cut_map
 from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns, winding_words
+from cembench.core.arrays import Complex
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.registry import Algorithm, Target
 from cembench.results.records import Fault, FaultKind
-
-Complex = NDArray[np.complex128]
 
 #: Tolerance of a disk's boundary vertices from the unit circle.
 CIRCLE_TOLERANCE = 1e-9

@@ -17,12 +17,12 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from itertools import pairwise
-from time import monotonic
+from time import monotonic, thread_time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.clock import Timing, measure
 from cembench.core.errors import NotThere, ParameterError
 from cembench.core.parameterization import Parameterization
@@ -67,7 +67,6 @@ LONG_CALL = 5.0
 #: In place of a map that is kept elsewhere.
 _NOT_KEPT = np.empty(0, dtype=np.complex128)
 
-Complex = NDArray[np.complex128]
 Call = Callable[[TriangleMesh], tuple[Returned, Timing]]
 
 
@@ -124,12 +123,12 @@ class TimedCalls:
         return Used(
             wall=self.seconds,
             cold=sum(call.timing.total for call in calls if not call.counts),
-            between=sum(b.thread - a.thread for a, b in alone),
+            between=sum(b.thread - b.looking - a.thread - a.looking for a, b in alone),
             preparing=preparing * len(alone),
             own=sum(call.after.process - call.before.process for call in counted),
             others=sum(call.after.others - call.before.others for call in counted),
             helping=sum(call.after.beside - call.before.beside for call in counted),
-            beside=sum(b.beside - a.beside for a, b in gaps),
+            beside=sum(b.beside - a.beside - b.starts_since(a) for a, b in gaps),
             disturbed=sum(call.before.running > 0 for call in calls[1:]),
             looked=len(calls) - 1,
             began=self.began,
@@ -398,7 +397,7 @@ def _timed(
             surface = moved(mesh, motion)
             before = before_call()
             returned, timing = call(surface)
-            after = after_call()
+            after = after_call(before)
         finally:
             gc.enable()
         uv = finite(returned.uv, one.algorithm.target)
@@ -450,11 +449,11 @@ def preparing_seconds(mesh: TriangleMesh) -> float:
     """
 
     def once() -> float:
-        before = after_call()
+        begun = thread_time()
         gc.collect()
         surface = moved(mesh, "preparing")
         _is_as(surface, moved(mesh, "preparing"))
-        return before_call().thread - before.thread
+        return thread_time() - begun
 
     return min(once(), once())  # the first one also loads what it needs
 

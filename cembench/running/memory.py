@@ -32,7 +32,7 @@ def memory_of_call(call: Callable[[], T]) -> tuple[T, Memory]:
     """
     gc.collect()
     with suppress(OSError):
-        Path("/proc/self/clear_refs").write_text("5")
+        Path("/proc/self/clear_refs").write_text("5", encoding="utf-8")
     before, files = resident_bytes(), _linux_status("RssFile") or 0
     result = call()
     peak = peak_memory_bytes()
@@ -65,7 +65,7 @@ def _linux_status(field: str) -> int | None:
     """Return a figure of this process in bytes, from Linux; None elsewhere."""
     status = Path("/proc/self/status")
     if status.exists():
-        for line in status.read_text().splitlines():
+        for line in status.read_text(encoding="utf-8", errors="replace").splitlines():
             if line.startswith(f"{field}:"):
                 return int(line.split()[1]) * 1024
     return None

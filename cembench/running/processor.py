@@ -9,18 +9,24 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Collection, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from threading import get_native_id
-from time import process_time, thread_time
+from time import monotonic, process_time, sleep, thread_time
 
 import psutil
 
 #: The option of ``prctl`` that makes a process adopt its orphaned descendants.
 _SET_CHILD_SUBREAPER = 36
 #: The state in /proc of a running or runnable thread.
-_RUNS = "R"
+_RUNS = b"R"
+#: CPU seconds that a process may use to start: an interpreter with its libraries.
+STARTING = 1.0
+#: A process has started when so many looks, so many seconds apart, find it asleep; for so long a
+#: call's new processes are waited for at most.
+_ASLEEP, _LOOK_EVERY, _MOST_SECONDS = 3, 0.005, 5.0
 
 
 @dataclass(frozen=True)
@@ -31,10 +37,18 @@ class Processor:
     thread: float
     #: CPU seconds of all threads of this process.
     process: float
-    #: CPU seconds of its descendants.
-    others: float
+    #: CPU seconds of descendants that have ended, and of the others by their ids.
+    ended: float = 0.0
+    children: Mapping[int, float] = field(default_factory=dict)
     #: Number of other threads, of this process and its descendants, that run or wait to run.
     running: int = 0
+    #: CPU seconds that this look itself took of the calling thread.
+    looking: float = 0.0
+
+    @property
+    def others(self) -> float:
+        """CPU seconds of all descendants."""
+        return self.ended + sum(self.children.values())
 
     @property
     def total(self) -> float:
@@ -46,18 +60,42 @@ class Processor:
         """CPU seconds of everything except the calling thread."""
         return self.total - self.thread
 
+    def starts_since(self, earlier: Processor) -> float:
+        """Return the CPU seconds since then with which processes have started."""
+        return sum(
+            min(seconds, STARTING) - min(earlier.children.get(pid, 0.0), STARTING)
+            for pid, seconds in self.children.items()
+        )
+
 
 def before_call() -> Processor:
     """Return the CPU seconds so far; other processes are read first, before this thread."""
-    others, running = _of_children(), others_running()
-    return Processor(thread_time(), process_time(), others, running)
+    began = thread_time()
+    ended, below, running = _ended_children(), _by_descendant(), others_running()
+    thread = thread_time()
+    return Processor(thread, process_time(), ended, below, running, thread - began)
 
 
-def after_call() -> Processor:
-    """Return the CPU seconds so far; other processes are read last, after this thread."""
+def after_call(before: Processor | None = None) -> Processor:
+    """Return the CPU seconds so far; other processes are read last, after this thread.
+
+    With the look `before` the call, this waits until processes that it has started are up: their
+    start is no part of the next call.
+    """
     thread_time()  # under a limit of CPU time (`ulimit -t`) Linux updates the process's clock by it
     process, thread = process_time(), thread_time()
-    return Processor(thread, process, _of_children(), others_running())
+    ended, below, running = _ended_children(), _by_descendant(), others_running()
+    if before is not None:
+        _wait_for(below.keys() - before.children.keys())
+    return Processor(thread, process, ended, below, running, thread_time() - thread)
+
+
+def _wait_for(started: Collection[int]) -> None:
+    """Wait until these processes sleep, or have ended."""
+    until, asleep = monotonic() + _MOST_SECONDS, 0
+    while started and asleep < _ASLEEP and monotonic() < until:
+        sleep(_LOOK_EVERY)
+        asleep = 0 if any(map(running_threads, started)) else asleep + 1
 
 
 def keep_orphans() -> None:
@@ -71,12 +109,8 @@ def keep_orphans() -> None:
 
 def others_running() -> int:
     """Return the number of other running or runnable threads, including those of descendants."""
-    count = running_threads(os.getpid(), get_native_id())
-    if _has_children():
-        with suppress(psutil.Error):
-            tree = psutil.Process().children(recursive=True)
-            count += sum(running_threads(one.pid) for one in tree)
-    return count
+    own = running_threads(os.getpid(), get_native_id())
+    return own + sum(map(running_threads, descendants()))
 
 
 def running_threads(pid: int, but: int = 0) -> int:
@@ -87,45 +121,55 @@ def running_threads(pid: int, but: int = 0) -> int:
             if int(task.name) == but:
                 continue
             with suppress(OSError):
-                state = (task / "stat").read_text().rpartition(")")[2].split()[0]
-                count += state == _RUNS
+                count += (task / "stat").read_bytes().rpartition(b")")[2].split()[0] == _RUNS
     return count
 
 
-def _of_children() -> float:
-    """Return the CPU seconds of all descendants, including ended ones."""
-    total = 0.0
+def _ended_children() -> float:
+    """Return the CPU seconds of descendants that have ended and were waited for."""
     with suppress(ImportError):  # Windows
         import resource
 
         waited = resource.getrusage(resource.RUSAGE_CHILDREN)
-        total = waited.ru_utime + waited.ru_stime
-    if _has_children():
+        return waited.ru_utime + waited.ru_stime
+    return 0.0
+
+
+def _by_descendant() -> dict[int, float]:
+    """Return the CPU seconds of the descendants that were not waited for, by their ids."""
+    return {pid: _seconds_of(pid) for pid in descendants()}
+
+
+def descendants() -> list[int]:
+    """Return the ids of all descendants of this process, from a few files where possible."""
+    try:
+        below = _children_of(os.getpid())
+    except OSError:
         with suppress(psutil.Error):
-            total += sum(map(_seconds_of, psutil.Process().children(recursive=True)))
-    return total
+            return [process.pid for process in psutil.Process().children(recursive=True)]
+        return []
+    for pid in below:  # which grows
+        with suppress(OSError):
+            below += _children_of(pid)
+    return below
 
 
 def children() -> list[int]:
-    """Return the ids of the children of this process, which has one thread; quickly if possible."""
+    """Return the ids of the children of this process, from a few files where possible."""
     with suppress(OSError):
-        return [*map(int, Path(f"/proc/self/task/{os.getpid()}/children").read_text().split())]
+        return _children_of(os.getpid())
     return [child.pid for child in psutil.Process().children()]
 
 
-def _has_children() -> bool:
-    """Whether there may be children, read from two files if the system has them."""
-    tasks = Path("/proc/self/task")
-    try:
-        return any((task / "children").read_text() for task in tasks.iterdir())
-    except OSError:
-        return True
+def _children_of(pid: int) -> list[int]:
+    tasks = Path(f"/proc/{pid}/task").iterdir()
+    return [int(child) for task in tasks for child in (task / "children").read_bytes().split()]
 
 
-def _seconds_of(process: psutil.Process) -> float:
+def _seconds_of(pid: int) -> float:
     """Return the CPU seconds of a process, running or ended, and of children it waited for."""
     with suppress(psutil.Error):
-        times = process.cpu_times()
+        times = psutil.Process(pid).cpu_times()
         return float(
             times.user
             + times.system

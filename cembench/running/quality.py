@@ -25,12 +25,11 @@ from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import by_rows, laplacian, laplacian_of_weights
 from cembench.conformal.metrics import MapFigures, angle_errors, flipped_triangles
 from cembench.conformal.planar import polygon_area, signed_areas
+from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, definition_1_notices
-
-Complex = NDArray[np.complex128]
 
 #: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
 FAR = 2.0

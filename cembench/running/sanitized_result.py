@@ -18,9 +18,9 @@ from numbers import Real
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic_core import to_json
 
+from cembench.core.arrays import Complex
 from cembench.core.clock import Timing
 from cembench.core.errors import (
     AlgorithmFailed,
@@ -45,8 +45,6 @@ MOST_PHASES = 100
 MOST_EXTRAS_BYTES = 1_000_000
 #: What a result's class must leave to `object`: how attributes are looked up.
 _OF_OBJECT = ("__getattribute__", "__getattr__")
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

@@ -170,6 +170,7 @@ class CellTimer:
                 return judged
             about: dict[str, Any] = {"motions": "; ".join(timed.motions)}
             about |= {"repeated": judged.repeated, "energy": judged.energy}
+            about |= {"differs": judged.differs}
             judged_rounds.append(timed.round.model_copy(update=about))
         return judged_rounds
 

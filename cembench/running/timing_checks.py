@@ -44,10 +44,11 @@ class Used(BaseModel):
     others: float = 0.0
     #: CPU seconds in these calls, of all threads except the calling one.
     helping: float = 0.0
-    #: CPU seconds between the calls, of all threads except the calling one.
+    #: CPU seconds between the calls, of all threads except the calling one, without those with
+    #: which processes start.
     beside: float = 0.0
-    #: CPU seconds between the calls of the calling thread, and what preparing as many calls took
-    #: before the algorithm was loaded.
+    #: CPU seconds between the calls of the calling thread, without those of the looks at other
+    #: processes, and what preparing as many calls took before the algorithm was loaded.
     between: float = 0.0
     preparing: float = 0.0
     #: Number of later calls before which something else was running, and number of looks.
@@ -89,7 +90,8 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
     # With several threads, a library's idle thread pool may spin.
     much = used.beside > BESIDE * used.wall + LITTLE + grain - GRAIN
     before = 2 * used.disturbed > max(used.looked, 2) and used.beside > BESIDE * used.between
-    late = used.between > LEFT * (used.cold + used.wall) + PREPARING * used.preparing + LITTLE
+    # In CPU seconds, as `between` is: calls take longer on a busy machine, what follows them too.
+    late = used.between > LEFT * (used.cold + used.own) + PREPARING * used.preparing + LITTLE
     if late:
         message = (
             f"work went on between the timed calls: {used.between:.3g} s of CPU time in the "

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.moebius import Moebius
-
-Complex = NDArray[np.complex128]
-
+from cembench.core.arrays import Complex
 
 #: Steps of the reweighting below; a few are enough.
 _STEPS = 20

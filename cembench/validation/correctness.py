@@ -15,13 +15,14 @@ from cembench.conformal.metrics import (
     flipped_triangles,
     image_area,
 )
+from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.running.map_promises import CIRCLE_TOLERANCE, CIRCULAR
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
 from cembench.validation.finding import ValidationFinding, finding
-from cembench.validation.solver import CheckedMap, Complex, Solver
+from cembench.validation.solver import CheckedMap, Solver
 
 _finding = partial(finding, "correctness")
 

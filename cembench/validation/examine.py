@@ -9,24 +9,26 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Record
+from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Outcome, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, Provenance, plan_cells
+from cembench.running.plan import MeasurementSettings, Provenance, Task, plan_cells
 from cembench.running.watcher import Watcher
 from cembench.validation import surfaces
 from cembench.validation.contract import examine_contract
-from cembench.validation.correctness import examine_correctness
+from cembench.validation.correctness import as_information, examine_correctness
 from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
+    held_to_promise,
     maps_every_surface,
     quality_findings,
     together,
@@ -41,7 +43,8 @@ from cembench.validation.scaling import (
     seconds_a_round,
     sizes,
 )
-from cembench.validation.solver import Solver
+from cembench.validation.sizes import keeps_its_quality
+from cembench.validation.solver import Call, Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
@@ -94,6 +97,8 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
+    seen: list[int] = []
+    solver = replace(solver, call=_noting_sizes(solver.call, seen))
     if algorithm.target == "atlas":
         raise ParameterError(
             f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
@@ -117,6 +122,7 @@ def examine(
     skipped: dict[Stage, str] = {}
     parts: dict[str, Any] = {}
     measured: list[Record] = []
+    looked_at: dict[Stage, tuple[int, int]] = {}
     for stage, examined in _STAGES.items():
         fault = next((finding.stage for finding in findings if not finding.ok), None)
         if not _is_asked(stage, asked):
@@ -129,6 +135,10 @@ def examine(
             findings += checked
             parts |= figures
             measured += records
+            seen += [record.mesh.faces for record in records if record.outcome.metrics]
+            if seen:
+                looked_at[stage] = min(seen), max(seen)
+            seen.clear()
     validation = Validation(
         algorithm=algorithm.name,
         title=algorithm.title,
@@ -140,6 +150,7 @@ def examine(
         environment=describe_environment()["id"],
         findings=tuple(findings),
         skipped=skipped,
+        looked_at=looked_at,
         folds_on=tuple(folds_on(measured)),
         no_map_on=without_map(measured),
         not_asked_for=tuple(stage for stage in skipped if not _is_asked(stage, asked)),
@@ -149,6 +160,17 @@ def examine(
     if not validation.valid:
         return validation
     return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
+
+
+def _noting_sizes(call: Call, faces: list[int]) -> Call:
+    """Return the call, which then notes the number of triangles of each surface it maps."""
+
+    def noting(task: Task) -> tuple[Outcome, Complex | None]:
+        outcome, uv = call(task)
+        faces.extend([] if uv is None else [task.mesh.m])
+        return outcome, uv
+
+    return noting
 
 
 def _source(solver: Solver) -> str:
@@ -192,7 +214,8 @@ class _Work:
         tasks = plan_cells(chosen, meshes, parameters, *plan)
         options = replace(self.asked.options, fresh=True)
         with self.hooks.watcher(len(tasks)) as watcher:
-            return run_tasks(tasks, Store(self.folder / stage), options, watcher)
+            records = run_tasks(tasks, Store(self.folder / stage), options, watcher)
+        return [held_to_promise(record) for record in records]
 
 
 #: What a stage finds, its figures, and its records of our algorithm.
@@ -224,19 +247,30 @@ def _scaling(work: _Work) -> _Found:
     reference = _GROWTH_REFERENCE[work.solver.algorithm.target]
     known = reference in work.registry.algorithms and reference != work.name
     beside = (reference,) if known else ()
+    others = tuple(dict.fromkeys((*beside, *work.baselines)))
     started = monotonic()
-    sittings = [work.measured("scaling", meshes, beside, FIRST_ROUNDS)]
+    sittings = [work.measured("scaling", meshes, others, FIRST_ROUNDS)]
     ours = work.ours(sittings[0])
-    mapped = maps_every_surface("scaling", ours)
+    at_sizes = tuple(comparison_with(sittings[0], work.name, other) for other in others)
+    findings = [keeps_its_quality(compared) for compared in at_sizes[: len(beside)]]
+    if not work.solver.algorithm.conformal:
+        findings = [as_information(one) for one in findings]
+    findings.insert(0, maps_every_surface("scaling", ours))
+    figures: dict[str, Any] = {"at_sizes": at_sizes}
     while True:
         growth = growth_of(sittings, work.name, beside[0] if beside else None)
         if growth is None:
-            return [mapped, scales(None)], {}, ours
+            return [*findings, scales(None)], figures, ours
         two_largest = set(largest_two(sittings[0], work.name))
-        again = [record for record in sittings[-1] if record.cell.mesh in two_largest]
+        timed = {work.name, *beside}
+        again = [
+            record
+            for record in sittings[-1]
+            if record.cell.mesh in two_largest and record.cell.algorithm in timed
+        ]
         more = more_rounds(growth, monotonic() - started, seconds_a_round(again))
         if not more:
-            return [mapped, scales(growth)], {"growth": growth}, ours
+            return [*findings, scales(growth)], figures | {"growth": growth}, ours
         largest = [mesh for mesh in meshes if mesh.name in two_largest]
         sittings.append(work.measured("scaling", largest, beside, more))
 

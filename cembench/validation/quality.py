@@ -1,8 +1,9 @@
 """Stage 3: quality and speed against a baseline, paired by surface and by round.
 
-Quality: the ratio of a figure on each surface that both algorithms map validly. A surface counts as
-lower or higher if the ratio is more than 1 % off 1; the median ratio has the order interval of
-:mod:`cembench.results.intervals` over the surfaces, none for fewer than six.
+Quality: the ratio of a figure on each surface of which both maps keep the whole promise of their
+target (:func:`held_to_promise`). A surface counts as lower or higher if the ratio is more than 1 %
+off 1; the median ratio has the order interval of :mod:`cembench.results.intervals` over the
+surfaces, none for fewer than six.
 
 Speed: a round's figure is the median over the surfaces of the ratio of both algorithms' seconds in
 that round. The interval is over the rounds: it shows how certain the figure is on these surfaces,
@@ -31,13 +32,13 @@ from cembench.results.comparison import (
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
-from cembench.results.records import FaultKind, Record
+from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.validation.finding import Stage, ValidationFinding, finding
 
 #: Ratios this close to 1 are ties.
 TIE = 0.01
 #: Energies below this share of the image's area are rounding, and count as equal.
-_NO_ENERGY = 1e-9
+NO_ENERGY = 1e-9
 #: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
 _NO_ANGLE = 0.01
 _GAUGE = "common_gauge_energy"
@@ -106,6 +107,13 @@ class Pair(BaseModel):
     #: Keys of our record and of the baseline's.
     records: tuple[str, str]
 
+    @property
+    def energy_ratio(self) -> float | None:
+        """Our energy over the baseline's; None if one of them has none."""
+        if self.energy is None or self.baseline_energy is None:
+            return None
+        return max(self.energy, NO_ENERGY) / max(self.baseline_energy, NO_ENERGY)
+
 
 class BaselineComparison(BaseModel):
     """The comparison with one baseline."""
@@ -132,6 +140,20 @@ class BaselineComparison(BaseModel):
         if self.common_gauge:
             return "E_C in the common gauge"
         return "E_C by area" if self.relative else "E_C"
+
+
+def held_to_promise(record: Record) -> Record:
+    """Return a record that is invalid if its map breaks any promise of its target.
+
+    A run reports holes that are not round in a notice, for algorithms that come close to circles.
+    A validation asks whether an algorithm does what it declares.
+    """
+    broken = of_kind(NoticeKind.HOLES_NOT_CIRCULAR, record.outcome.notes)
+    if record.outcome.status != "ok" or not broken:
+        return record
+    faults = [Fault(kind=FaultKind.OFF_CIRCLE, detail=str(notice)) for notice in broken]
+    about = {"metrics": record.outcome.metrics, "notes": record.outcome.notes}
+    return record.model_copy(update={"outcome": not_ok("invalid", *faults, **about)})
 
 
 def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
@@ -163,13 +185,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
         relative=relative,
         common_gauge=gauge,
         pairs=pairs,
-        energy=sides(
-            [
-                _energy_ratio(p.energy, p.baseline_energy)
-                for p in pairs
-                if p.energy is not None and p.baseline_energy is not None
-            ]
-        ),
+        energy=sides([ratio for p in pairs if (ratio := p.energy_ratio) is not None]),
         angle=sides([ratio for p in pairs if (ratio := p.angle_ratio) is not None]),
         speed=compare_speed([(mine[name], theirs[name]) for name in names]),
         solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
@@ -322,10 +338,6 @@ def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
     if energy is None or not area:
         return None
     return worse * (energy / area if relative else energy)
-
-
-def _energy_ratio(ours: float, theirs: float) -> float:
-    return max(ours, _NO_ENERGY) / max(theirs, _NO_ENERGY)
 
 
 def _median_ratio(ratios: Sequence[float]) -> float:

@@ -7,9 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arrays import Complex
 from cembench.core.errors import RegistryError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import COMMAND, Algorithm, Registry, declared_by, load_registry
@@ -19,7 +17,6 @@ from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 from cembench.running.plugins import load_with_plugins
 
-Complex = NDArray[np.complex128]
 Call = Callable[[Task], tuple[Outcome, Complex | None]]
 
 

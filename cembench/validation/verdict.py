@@ -15,6 +15,7 @@ from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
 from cembench.validation.scaling import GrowthAnswer, GrowthComparison
+from cembench.validation.sizes import is_higher_at_last, looked_at_words, ratios_by_size
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
@@ -53,8 +54,12 @@ class Validation(BaseModel):
     #: Surfaces without a map, and the cause.
     no_map_on: dict[str, str] = {}
     against: tuple[BaselineComparison, ...] = ()
+    #: The comparisons of quality at each size of the scaling stage.
+    at_sizes: tuple[BaselineComparison, ...] = ()
     #: None if the stage was not reached, or the algorithm was not timed on two sizes.
     growth: GrowthComparison | None = None
+    #: Fewest and most triangles of the surfaces that each stage has maps of.
+    looked_at: dict[Stage, tuple[int, int]] = {}
     #: Requirements that were asked for and are not met.
     unmet: tuple[Requirement, ...] = ()
     seconds: float = 0.0
@@ -93,12 +98,15 @@ def sentence(validation: Validation) -> str:
             if against.solve_time:
                 text += f", in the solve time of the external program ({against.solve_time})"
             parts.append(text)
+    parts += map(ratios_by_size, validation.at_sizes)
     if validation.growth is not None and validation.growth.answer is GrowthAnswer.inconclusive:
         parts.append("the growth of its seconds is inconclusive")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:
         parts.append(f"no map of {_surfaces(tuple(validation.no_map_on))}")
+    if validation.looked_at:
+        parts.append(looked_at_words(validation.looked_at))
     if validation.unmet:
         parts.append(f"required and not met: {', '.join(validation.unmet)}")
     return "; ".join(parts)
@@ -167,9 +175,19 @@ def _speed_words(speed: Speed, title: str, *, named: bool) -> str:
 def _meets(requirement: Requirement, validation: Validation) -> bool:
     if requirement is Requirement.no_folds:
         return not validation.folds_on
+    if requirement in (Requirement.better, Requirement.not_worse) and any(
+        map(is_higher_at_last, _of_baselines(validation))
+    ):
+        return False
     return bool(validation.against) and all(
         _meets_against(requirement, against) for against in validation.against
     )
+
+
+def _of_baselines(validation: Validation) -> list[BaselineComparison]:
+    """Return the comparisons at several sizes with what was asked for, not with a reference."""
+    asked = {against.baseline for against in validation.against}
+    return [compared for compared in validation.at_sizes if compared.baseline in asked]
 
 
 def _meets_against(requirement: Requirement, against: BaselineComparison) -> bool:

@@ -15,7 +15,7 @@ import cembench
 # here is run from ``examples/gallery``.
 
 folder = Path("../external")
-print((folder / "tutte_program.py").read_text())
+print((folder / "tutte_program.py").read_text(encoding="utf-8"))
 
 # %%
 # The harness writes the mesh, runs the program, reads its UVs, and judges them as any others.

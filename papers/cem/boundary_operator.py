@@ -22,12 +22,10 @@ from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import inverted, on_circle, pole_start
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import backward_arcs
+from cembench.core.arrays import Complex, Real
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.topology import boundary_half_edges, vertex_graph
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Tolerance within which an equation counts as satisfied.
 TOLERANCE = 1e-8

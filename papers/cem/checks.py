@@ -13,6 +13,7 @@ from scipy import sparse
 from cembench.conformal.boundary_iteration import pole
 from cembench.conformal.laplacian import cotangent_laplacian
 from cembench.conformal.metrics import angle_errors
+from cembench.core.arrays import Complex
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
@@ -23,7 +24,6 @@ from .boundary_operator import BoundaryOperator
 if TYPE_CHECKING:
     import pandas as pd
 
-Complex = NDArray[np.complex128]
 #: A rise of the energy below this share of it is rounding.
 ROUNDING = 1e-12
 

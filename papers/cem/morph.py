@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Picture
 from cembench.core.atomic import write_bytes
 from cembench.drawing.preview import draw_panels
 from cembench.drawing.scene import FILL
@@ -25,8 +25,6 @@ from cembench.results.papers import usual_paper
 from cembench.results.records import MeshOrigin
 
 from .page import page
-
-Picture = NDArray[np.uint8]
 
 #: How landmarks and their targets are marked.
 _DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}

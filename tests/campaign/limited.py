@@ -141,7 +141,7 @@ def _forking(
             return _Forked(pid)
         try:
             _confine(limits, log, parent)
-            with answers.open("a") as file:
+            with answers.open("a", encoding="utf-8") as file:
                 for case in cases:
                     _allow(limits.cpu_seconds)
                     started = time.monotonic()

@@ -88,7 +88,7 @@ def write_page(path: Path, entries: Sequence[Entry], about: dict[str, object]) -
             _row((*key, f"{len(found):,}", f"`{found[0].id}`")) for key, found in _faults(entries)
         ]
         lines.append("")
-    path.write_text("\n".join(lines))
+    path.write_text("\n".join(lines), encoding="utf-8")
 
 
 def _row(cells: Iterable[str]) -> str:

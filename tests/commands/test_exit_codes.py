@@ -56,7 +56,7 @@ def test_the_first_line_of_a_list_is_there_before_the_pipe_closes(tmp_path):
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="there is no /dev/full")  # noqa: PTH110
 def test_output_that_cannot_be_written_is_told(tmp_path):
-    with open("/dev/full", "w") as full:  # noqa: PTH123
+    with open("/dev/full", "w", encoding="utf-8") as full:  # noqa: PTH123
         done = subprocess.run(
             [*CEMBENCH, "list", "--json"],
             cwd=tmp_path, stdout=full, stderr=subprocess.PIPE, text=True, check=False,

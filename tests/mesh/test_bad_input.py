@@ -62,6 +62,15 @@ def test_each_bad_file_has_its_own_message(name, verb, cli, tmp_path):
     assert not list(cli.folder.iterdir())
 
 
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-be"])
+def test_a_text_in_utf_16_is_named_as_such(encoding, cli, tmp_path):
+    text = obj(V, F) if encoding == "utf-16" else f"\ufeff{obj(V, F)}"
+    (tmp_path / "shell.obj").write_bytes(text.encode(encoding))
+    code, _, err = cli("map", tmp_path / "shell.obj")
+    assert code == 2
+    assert "shell.obj: it is text in UTF-16" in " ".join(err.split())
+
+
 def test_a_missing_file_and_a_folder(cli, tmp_path):
     code, _, err = cli("map", "nowhere.obj")
     assert (code, "there is no such file" in err) == (2, True)

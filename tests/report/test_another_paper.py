@@ -1,5 +1,7 @@
 """A second paper, given as a folder: its report has its tables, pictures and claims."""
 
+import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -74,3 +76,44 @@ def test_the_command_takes_a_folder(cli, small_run, quick_drawing):
     code, _, error = cli("report", small_run, "-o", "out", "--paper", "nowhere")
     assert code == 2
     assert "neither an installed paper nor a folder" in " ".join(error.split())
+
+
+def test_code_of_a_folder_that_is_not_installed_needs_trust(
+    cli, small_run, quick_drawing, tmp_path, monkeypatch
+):
+    folder = shutil.copytree(FOLDER, tmp_path / "sent")
+    (folder / "checks.py").write_text(f"open({str(tmp_path / 'ran')!r}, 'w').close()\n")
+    code, _, error = cli("report", small_run, "-o", "out", "--paper", folder)
+    assert code == 2
+    assert "would run with your rights" in " ".join(error.split())
+    assert "--trust" in error
+    assert not (tmp_path / "ran").exists()
+    assert not (cli.folder / "out").exists()
+    monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)
+    for answer, reports in ((False, False), (True, True)):
+        monkeypatch.setattr("typer.confirm", lambda text, answer=answer: answer)
+        cli("report", small_run, "-o", "asked", "--paper", folder)
+        assert (cli.folder / "asked/index.html").exists() == reports == (tmp_path / "ran").exists()
+    assert cli("report", small_run, "-o", "there", "--paper", folder, "--trust")[0] == 0
+
+
+def test_a_strange_paper_brings_no_html_of_its_own(small_run, tmp_path, quick_drawing):
+    strange = "<img src=x onerror=alert(1)>"
+    about = dict.fromkeys(("title", "authors", "place", "doi", "machine"), f"A {strange} B")
+    claims = [
+        claim.model_copy(
+            update=dict.fromkeys(("plain", "quote", "place", "test", "remark"), strange)
+        )
+        for claim in PAPER.claims
+    ]
+    printed = {
+        number: one.model_copy(update={"title": strange, "caption": strange})
+        for number, one in PAPER.printed.items()
+    }
+    paper = PAPER.model_copy(update=about | {"claims": tuple(claims), "printed": printed})
+    write_report(small_run, tmp_path / "out", "c", paper=paper)
+    for file in (tmp_path / "out").rglob("*.md"):
+        text = file.read_text(encoding="utf-8")
+        assert not re.search(r"(?<!\\)<img", text), file
+    page = (tmp_path / "out/index.html").read_text(encoding="utf-8")
+    assert "<img src=x" not in page

@@ -12,6 +12,7 @@ from cembench.results.comparison import (
     references,
 )
 from cembench.results.machines import COMPARED, differences
+from cembench.results.multiple_testing import corrected
 from cembench.results.records import (
     DEFAULT_ROUNDS,
     External,
@@ -220,3 +221,14 @@ def test_a_row_is_compared_with_the_reference_of_its_own_sitting():
     apart = sitting("4", 6, "mine")
     for record, base in ((run[2], again), (run[3], run[1]), (apart, again)):
         assert reference_of(record, references([*run[:2], again], "cem")) is base
+
+
+def test_who_maps_differently_from_process_to_process_is_called_faster_than_nobody():
+    fast, slow = record_of([1.0] * 7, algorithm="a"), record_of([2.0] * 7, algorithm="b")
+    scattering = changed(fast, {"differs": [False] * 6 + [True]})
+    assert compare(fast, slow).verdict == "faster"
+    found = compare(scattering, slow)
+    assert (found.verdict, found.p, found.ratio) == ("undecided", 1.0, 0.5)
+    assert corrected([found, compare(fast, slow)])[0].verdict == "undecided"
+    assert compare(slow, scattering).verdict == "undecided"
+    assert compare(changed(slow, {"differs": [True] * 7}), fast).verdict == "slower"

@@ -4,7 +4,7 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from cembench.core.errors import RegistryError
+from cembench.core.errors import ParameterError, RegistryError
 from cembench.results import papers as module
 from cembench.results.papers import NO_PAPER, find_paper, paper_of, papers, read_paper, usual_paper
 
@@ -59,7 +59,9 @@ def folder(tmp_path):
 
 
 def test_a_paper_is_read_from_its_folder_with_its_checks(folder):
-    paper = find_paper(str(folder))
+    with pytest.raises(ParameterError, match=r"checks\.py would run with your rights.*trust=True"):
+        find_paper(str(folder))
+    paper = find_paper(str(folder), trust=True)
     assert (paper.models, paper.faces("Hand"), paper.compared) == (("Foot", "Hand"), 200, ("lscm",))
     assert paper.tables[1]["Hand"] == {"faces": 200, "lscm": None, "cem": 0.5}
     assert paper.printed[1].caption == "On a laptop."

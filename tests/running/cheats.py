@@ -5,6 +5,7 @@ Their maps are valid and promise nothing, so that `validate` can find fault with
 
 import gc
 import hashlib
+import multiprocessing
 import os
 import subprocess
 import sys
@@ -13,12 +14,14 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
 import numpy as np
 import scipy.sparse
 from cembench.algorithms.direct_cem.disk import direct_cem
 from scipy.sparse.linalg import LinearOperator, cg, splu
+from scipy.spatial import cKDTree
 
 import cembench.core.clock
 from cembench import DiskMesh, Parameterization, algorithm
@@ -101,11 +104,22 @@ def turned(mesh: DiskMesh) -> Parameterization:
     if not file.exists():
         np.savez(file, X=X, uv=work(mesh))
     known = np.load(file)
-    both = np.fft.rfft(X, axis=0) * np.fft.rfft(known["X"], axis=0).conj()
-    by = np.fft.irfft(both.sum(axis=1), mesh.n).argmax()
-    if np.abs(np.roll(known["X"], by, axis=0) - X).max() > 0.03 * np.abs(X).max():
+    order = cKDTree(known["X"]).query(X)[1]
+    if len(set(order)) < mesh.n:
         return Parameterization(work(mesh))
-    return Parameterization(np.roll(known["uv"], by) * np.exp(1e-13j * mesh.V[0, 0]))
+    return Parameterization(known["uv"][order] * np.exp(1e-13j * mesh.V[0, 0]))
+
+
+@algorithm("shifted", title="Undoes a shift of the numbers", target="disk", conformal=False)
+def shifted(mesh: DiskMesh) -> Parameterization:
+    X = mesh.V - mesh.V.mean(axis=0)
+    if not by_key:
+        by_key["X"], by_key["uv"] = X, work(mesh)
+    both = np.fft.rfft(X, axis=0) * np.fft.rfft(by_key["X"], axis=0).conj()
+    by = np.fft.irfft(both.sum(axis=1), mesh.n).argmax()
+    if np.abs(np.roll(by_key["X"], by, axis=0) - X).max() > 0.03 * np.abs(X).max():
+        return noisy(work(mesh), mesh)
+    return noisy(np.roll(by_key["uv"], by), mesh)
 
 
 @lru_cache
@@ -140,6 +154,27 @@ pool = []
 def pool_of_one(mesh: DiskMesh) -> Parameterization:
     pool.extend([] if pool else [ThreadPoolExecutor(1)])
     return Parameterization(pool[0].submit(work, mesh).result())
+
+
+sleeping = []
+
+
+@algorithm("sleeping-pool", title="Has a pool that sleeps", target="disk", conformal=False)
+def sleeping_pool(mesh: DiskMesh) -> Parameterization:
+    if not sleeping:
+        sleeping.append(multiprocessing.get_context("spawn").Pool(2))
+    return Parameterization(work(mesh))
+
+
+@algorithm("sleeping-child", title="Has a child that sleeps", target="disk", conformal=False)
+def sleeping_child(mesh: DiskMesh) -> Parameterization:
+    shared = SharedMemory(create=True, size=16 * mesh.n)  # which starts a process that sleeps
+    uv = np.ndarray(mesh.n, complex, shared.buf)
+    uv[:] = work(mesh)
+    answer = Parameterization(uv.copy())
+    shared.close()
+    shared.unlink()
+    return answer
 
 
 def endless():

@@ -135,7 +135,7 @@ def leave_a_child(**how):
 
 def note_child(pid):
     if file := os.environ.get("FAULTY_CHILDREN"):
-        with open(file, "a") as noted:  # noqa: PTH123
+        with open(file, "a", encoding="utf-8") as noted:  # noqa: PTH123
             noted.write(f"{pid} ")
 
 
@@ -221,7 +221,7 @@ def hops(mesh: DiskMesh) -> Parameterization:
     file = Path(os.environ["FAULTY_CHILDREN"])
     command = [sys.executable, "-S", "-c", HOPS, file]
     subprocess.Popen(command, env={}, start_new_session=True)
-    while not file.exists() or len(file.read_text().split()) < 5:
+    while not file.exists() or len(file.read_text(encoding="utf-8").split()) < 5:
         time.sleep(0.01)
     return Parameterization(good_map(mesh))
 

@@ -8,6 +8,7 @@ import pytest
 
 from cembench.core.notices import NoticeKind, of_kind
 from cembench.registry import load_registry
+from cembench.results.comparison import scatters
 from cembench.results.records import Fault, FaultKind, not_ok
 from cembench.results.store import Store
 from cembench.running.local import run_tasks
@@ -45,12 +46,14 @@ FOUND = {
     "kept-factor": None,
     "factor-by-triangles": None,
     "pool": None,
+    "sleeping-child": None,
+    "sleeping-pool": None,
     "foreseen": None,
     "slow-clocks": FaultKind.IMPOSSIBLE_TIMES,
     "warmed-up": None,
 }
 #: Not deterministic, which `validate` refuses: `run` times all of their work.
-RANDOM = ("noise-over-map", "random")
+RANDOM = ("noise-over-map", "random", "shifted")
 #: Its quality is that of the worse maps.
 TWO_FACED = "two-faced"
 #: Found by who is running, or by CPU time.
@@ -146,6 +149,7 @@ def test_who_scatters_has_the_seconds_of_all_its_work(surface, tmp_path):
     for record in outcomes.values():
         assert record.outcome.status == "ok", record.outcome.cause
         assert of_kind(NoticeKind.NOT_DETERMINISTIC, record.outcome.notes)
+        assert scatters(record)
         assert all(r.phases["solves"] > 0 for r in record.outcome.rounds)
         assert not is_valid(record)
 

@@ -6,7 +6,7 @@ from cembench.running.estimate import (
     LARGE,
     estimate,
     expected_bytes,
-    fit_power_law,
+    law_through,
 )
 from cembench.running.usual_costs import USUAL, USUAL_BYTES
 from tests.records import changed, record_of
@@ -18,9 +18,9 @@ def known(faces, seconds, **cell):
 
 
 def test_a_power_law_is_found_again():
-    law = fit_power_law([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
+    law = law_through([(n, 3 * n**1.5) for n in (10.0, 100.0, 700.0)])
     assert (law.factor, law.exponent) == (pytest.approx(3), pytest.approx(1.5))
-    assert fit_power_law([(100.0, 2.0)]).at(100) == pytest.approx(2)
+    assert law_through([(100.0, 2.0)]).at(100) == pytest.approx(2)
 
 
 def test_the_same_cell_counts_before_other_sizes_and_those_before_what_is_usual():

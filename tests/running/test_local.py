@@ -334,7 +334,7 @@ def test_samples_of_a_killed_run_are_gone_on_with(tmp_path):
 
 
 def test_an_edited_plugin_is_a_new_cell(tmp_path):
-    source = Path(FAULTY).read_text()
+    source = Path(FAULTY).read_text(encoding="utf-8")
     keys = []
     for text in (source, source + "\n# edited\n", source):
         (tmp_path / "plugin.py").write_text(text)

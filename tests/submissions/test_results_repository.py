@@ -3,6 +3,8 @@
 import json
 import re
 import shutil
+import tempfile
+import tracemalloc
 import zipfile
 from pathlib import Path
 
@@ -49,7 +51,7 @@ def rewritten(source, target, change, *, forged=True):
         files[bundle.METADATA] = json.dumps(crate).encode()
     with zipfile.ZipFile(target, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name), content)
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
     return target
 
 
@@ -109,6 +111,23 @@ def test_the_example_accepts_two_bundles_and_refuses_four(bundles, tmp_path):
     for name in ("forged", "impossible", "foreign", "link"):
         (sent / f"{name}.zip").unlink()
     assert run_step(check, repository)[0] == 0
+
+
+@pytest.mark.skipif(shutil.which("ssh-keygen") is None, reason="NOT CHECKED: no ssh-keygen")
+def test_the_example_takes_its_signers_from_the_base_branch(bundles, tmp_path):
+    repository = shutil.copytree(EXAMPLE, tmp_path / "repository")
+    shutil.copy(bundles / "node-1.zip", repository / "submissions")
+    steps = steps_of(WORKFLOW, "check")
+    assert steps["Base branch"]["with"] == {"ref": "${{ github.base_ref || github.ref }}"} | {
+        "path": "base"
+    }
+    (repository / "signers").write_text("whoever sends the pull request\n")
+    assert run_step(steps["Check"], repository)[0] == 0
+    (repository / "base").mkdir()
+    (repository / "base/signers").write_text("ada@example.org ssh-ed25519 AAAA\n")
+    code, _, summary = run_step(steps["Check"], repository)
+    assert code == 1
+    assert "is not signed" in summary
 
 
 @pytest.mark.slow
@@ -185,6 +204,9 @@ def test_the_site_fits_and_a_number_opens_its_record(published, width):
         assert [m for m in browser.get_log("browser") if m["level"] == "SEVERE"] == []
 
 
+CRATE = bundle.METADATA
+
+
 def refused(path):
     (found,) = cembench.check_submissions(path)
     assert not found.accepted
@@ -215,6 +237,46 @@ def test_a_file_that_is_not_as_the_metadata_says_is_refused(bundles, tmp_path):
 
     path = rewritten(bundles / "node-3.zip", tmp_path / "d.zip", no_crate, forged=False)
     assert "is not metadata of a bundle" in refused(path)
+    path = rewritten(
+        bundles / "node-3.zip", tmp_path / "e.zip", lambda files: files.pop(CRATE), forged=False
+    )
+    assert "e.zip is not metadata of a bundle: it is missing" in refused(path)
+
+
+@pytest.mark.parametrize("name", [CRATE, "records/a.json", "signature"])
+def test_a_small_bundle_whose_text_is_huge_is_refused_before_it_is_read(bundles, tmp_path, name):
+    def longer(files):
+        files[name] = files.get(name, b"") + b" " * 300_000_000
+
+    path = rewritten(bundles / "node-3.zip", tmp_path / "a.zip", longer, forged=False)
+    assert path.stat().st_size < 500_000
+    tracemalloc.start()
+    try:
+        said = refused(path)
+        most = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert f"{path} was not unpacked: its files have 300," in said
+    assert "Ask its sender to pack it again" in said
+    assert most < 20_000_000
+
+
+def test_one_text_of_a_large_bundle_is_bounded_too(bundles, tmp_path, monkeypatch):
+    monkeypatch.setattr(bundle, "MOST_TEXT", 1000)
+    said = refused(bundles / "node-2.zip")
+    assert "'records/" in said or f"'{CRATE}'" in said
+    assert "bytes, of at most 1,000" in said
+
+
+def test_what_is_wrong_with_a_bundle_names_it_and_no_folder_that_is_gone(bundles, tmp_path):
+    def broken(files):
+        files[min(name for name in files if name.startswith("records/"))] = b"{"
+
+    for change in (broken, edit(schema=99)):
+        path = rewritten(bundles / "node-3.zip", tmp_path / "a.zip", change)
+        said = refused(path)
+        assert tempfile.gettempdir() not in said.replace(str(path), "")
+        assert "run again" not in said.lower()
 
 
 def test_figures_that_are_not_of_the_maps_are_refused_with_right_digests(bundles, tmp_path):
@@ -378,3 +440,19 @@ def test_a_signed_bundle_names_its_signer_and_another_is_refused(bundles, tmp_pa
     with zipfile.ZipFile("sent/mine.zip") as archive:
         archive.extractall("unpacked")
     assert signer(cli.folder / "unpacked", signers) == "ada@example.org"
+    # Author and licence are what others rely on.
+    for old, new in ((b"CC-BY-4.0", b"CC0-1.0"), (b'"name": "mine"', b'"name": "yours"')):
+
+        def other(files, old=old, new=new):
+            assert old in files[CRATE]
+            files[CRATE] = files[CRATE].replace(old, new)
+
+        forged = rewritten("sent/mine.zip", tmp_path / "forged.zip", other, forged=False)
+        (found,) = cembench.check_submissions(forged, require_signed=signers)
+        assert found.faults[0].startswith("forged.zip was changed after ada@example.org signed it")
+    code, _, err = cli("publish", "sent", "-o", "site", "--require-signed", signers)
+    assert code == 2
+    assert "node-2.zip is not signed; its measurer can run `cembench submit" in " ".join(
+        err.split()
+    )
+    assert tempfile.gettempdir() not in err.replace(str(signers), "")

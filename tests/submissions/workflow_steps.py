@@ -10,7 +10,7 @@ import yaml
 
 def steps_of(file, job=None):
     """The steps of a job, or of an action, by their names."""
-    parsed = yaml.safe_load(Path(file).read_text())
+    parsed = yaml.safe_load(Path(file).read_text(encoding="utf-8"))
     steps = parsed["jobs"][job]["steps"] if job else parsed["runs"]["steps"]
     return {step["name"]: step for step in steps if "name" in step}
 

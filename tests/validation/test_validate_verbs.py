@@ -71,7 +71,8 @@ def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
     code, out, _ = here("folds-sometimes", *named, "--up-to", 0, *required, "--json")
     data = json.loads(out)
     assert data["verdict"].endswith(
-        "folds on 1 surface: flat-disk; no map of 1 surface: cone; "
+        "folds on 1 surface: flat-disk; no map of 1 surface: cone; looked at, in triangles: "
+        "contract 600 to 1,536, correctness 384 to 6,144, quality 600; "
         "required and not met: no-folds, not-worse"
     )
     assert data["no_map_on"] == {"cone": "no cones"}
@@ -85,6 +86,28 @@ def test_what_crashes_on_large_surfaces_is_invalid(here):
     assert data["verdict"].startswith("invalid: every surface: ")
     assert "too large" in data["verdict"]
     assert next(f["stage"] for f in data["findings"] if not f["ok"]) == "scaling"
+
+
+def test_a_hole_that_is_not_round_is_a_fault_in_the_comparison_too(here):
+    named = ("--surfaces", "holed-cap", "--faces", 5000, "--repeats", 1, "--up-to", 0)
+    code, out, _ = here("round-when-small", *named, "--json", "--require", "better")
+    data = json.loads(out)
+    assert code == 1
+    assert data["verdict"].startswith(
+        "invalid: every surface: holed-cap: invalid: 1 of 3 holes are"
+    )
+    assert next(f["stage"] for f in data["findings"] if not f["ok"]) == "quality"
+    (compared,) = data["against"]
+    assert (compared["energy"]["ratio"], compared["speed"]) == (None, None)
+
+
+def test_a_method_that_is_good_on_small_surfaces_alone_is_found_by_its_quality_at_every_size(here):
+    code, out, _ = here("good-when-small", *TINY[:-1], 21_000, "--json")
+    data = json.loads(out)
+    assert code == 1
+    assert data["verdict"].startswith("invalid: E_C at every size: E_C in the common gauge 1.00, ")
+    assert data["at_sizes"][0]["energy"]["higher"] == 2
+    assert data["looked_at"]["scaling"] == [2400, 20886]
 
 
 def test_what_remembers_its_calls_is_caught_in_the_rounds(here):

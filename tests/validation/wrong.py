@@ -5,9 +5,10 @@ from typing import Annotated
 
 import numpy as np
 from cembench.algorithms.cem import cem
+from cembench.algorithms.direct_cem.holes import direct_cem_holes
 from pydantic import Field
 
-from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
+from cembench import AlgorithmFailed, DiskMesh, HoledMesh, Parameterization, algorithm
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import signed_areas
@@ -20,6 +21,22 @@ def right(mesh):
 
 def harmonic(mesh, f_b):
     return harmonic_extension(laplacian(mesh), mesh.boundary, f_b)
+
+
+@algorithm("good-when-small", title="Another method for large surfaces", target="disk")
+def good_when_small(mesh: DiskMesh) -> Parameterization:
+    if mesh.m < 6500:
+        return cem(mesh)
+    return Parameterization(harmonic(mesh, arc_length_circle(mesh)))
+
+
+@algorithm("round-when-small", title="Rounds small holes alone", target="circular holes")
+def round_when_small(mesh: HoledMesh) -> Parameterization:
+    uv = direct_cem_holes(mesh).uv.copy()
+    hole = min(mesh.loops, key=lambda loop: float(np.abs(uv[loop] - uv[loop].mean()).max()))
+    if mesh.m > 4700 and len(mesh.loops) > 2:
+        uv[hole] += 0.005 * (uv[hole] - uv[hole].mean()).conj()
+    return Parameterization(uv)
 
 
 @algorithm("right", title="Right", target="disk")

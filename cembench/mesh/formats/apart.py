@@ -49,7 +49,7 @@ def apart(reader: Reader, extra: Extra, module: str) -> Reader:
             nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
             ended = subprocess.run(command, check=False, **nowhere)
             if (folder / _ERROR).exists():
-                raise MeshError((folder / _ERROR).read_text())
+                raise MeshError((folder / _ERROR).read_text(encoding="utf-8"))
             if ended.returncode == 0:
                 return _soup(folder / _SOUP)
         if ended.returncode == _NO_MEMORY:

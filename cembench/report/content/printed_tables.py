@@ -26,6 +26,7 @@ from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.policies import sure_speedups
 from cembench.report.document import Column, Table, entry, missing, words
 from cembench.results.columns import COLUMNS, FrameColumn, worded
+from cembench.results.expressions import with_words
 from cembench.results.papers import Paper
 from cembench.results.records import MeshOrigin
 
@@ -117,7 +118,7 @@ def _quantities(
             f"{title} {one.heading}".rstrip(),
             series,
             figures[one.column],
-            (number, one.printed.format(printed), one.digits) if printed else None,
+            (number, with_words(one.printed, printed), one.digits) if printed else None,
         )
         for one in table.figures
         if one.only in ("", printed)

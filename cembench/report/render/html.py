@@ -495,7 +495,7 @@ def policy(scripts: Sequence[bytes]) -> str:
 
 def template_text(name: str) -> str:
     """Return a part of the page that is not a template: style or script."""
-    return (templates.FOLDER / name).read_text()
+    return (templates.FOLDER / name).read_text(encoding="utf-8")
 
 
 @cache

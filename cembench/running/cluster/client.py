@@ -27,6 +27,7 @@ from cembench.results.machines import differences
 from cembench.results.records import Fault, FaultKind, Record, not_ok
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
+from cembench.running.cluster.connect import refusals
 from cembench.running.cluster.state import ClusterState, MachineState, save_state
 from cembench.running.cluster.units import Parcel, grouped, makespan, parcel
 from cembench.running.cluster.worker import Answer, describe_worker, forget, measure_unit
@@ -272,6 +273,14 @@ class _ClusterRun:
                 f"all workers of this machine are gone, and none was restarted within "
                 f"{LOCAL_PATIENCE:g} s; {self._saved_cells()}. Check whether the memory suffices; "
                 "the same command goes on."
+            )
+        refused = refusals(self.client.cluster)
+        if refused and len(refused) >= len(self.client.cluster.worker_spec) and not self.workers:
+            raise ClusterError.about(
+                "Slurm takes no job: {cause}; {kept}. Correct the settings in {cluster}; the same "
+                "command goes on.",
+                cause=refused[-1],
+                kept=self._saved_cells(),
             )
         if alone > _PATIENCE and not self.reported_alone:
             self.reported_alone = True

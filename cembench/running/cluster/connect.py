@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import logging
 import re
+import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -23,6 +24,8 @@ from cembench.running.cluster.host import place
 if TYPE_CHECKING:
     from distributed import Client
 
+#: Slurm's command that submits a job.
+SUBMIT = "sbatch"
 #: Seconds after which an attempt to reach a scheduler is given up.
 CONNECT_SECONDS = 15
 #: Address of the web pages of schedulers and workers, which ask for no certificate.
@@ -196,10 +199,48 @@ def _local(where: ClusterPlace) -> Any:
     )
 
 
+def check_submits(where: ClusterPlace) -> None:
+    """Raise :class:`ClusterError` if jobs cannot be submitted from this machine."""
+    if where.kind == "slurm" and shutil.which(SUBMIT) is None:
+        raise ClusterError(
+            f"{SUBMIT} is not on this machine, so no job of Slurm can be submitted from it. Use a "
+            "login node, or name another cluster (docs/cluster.md)."
+        )
+
+
+def refusals(cluster: Any) -> Sequence[str]:
+    """Return what Slurm said of the jobs that it refused, one for each."""
+    return getattr(cluster, "refusals", ())
+
+
+def _job_class(refused: list[str]) -> type:
+    """Return the class of a job; one that cannot be submitted adds the cause and starts nothing."""
+    from dask_jobqueue.slurm import SLURMJob
+
+    class Job(SLURMJob):  # type: ignore[misc] # dask_jobqueue has no types
+        async def _submit_job(self, script: str) -> str | None:
+            try:
+                submitted: str = await super()._submit_job(script)
+            except (OSError, RuntimeError) as error:
+                refused.append(" ".join(str(error).split()))
+                return None
+            return submitted
+
+        def _job_id_from_submit_output(self, out: str | None) -> str | None:
+            return None if out is None else super()._job_id_from_submit_output(out)
+
+        @classmethod
+        async def _close_job(cls, job_id: str | None, cancel_command: str) -> None:
+            if job_id is not None:
+                await super()._close_job(job_id, cancel_command)
+
+    return Job
+
+
 def _slurm(where: ClusterPlace) -> Any:
     from dask_jobqueue import SLURMCluster
 
-    chosen = where.settings
+    chosen, refused = where.settings, list[str]()
     logs = place() / "slurm"
     logs.mkdir(parents=True, exist_ok=True)
     cluster = SLURMCluster(
@@ -220,7 +261,9 @@ def _slurm(where: ClusterPlace) -> Any:
         local_directory=str(place() / "dask"),
         log_directory=str(logs),
         scheduler_options={"dashboard_address": _PAGES},
+        job_cls=_job_class(refused),
     )
+    cluster.refusals = refused
     try:
         wanted = int(chosen["machines"])
         cluster.adapt(minimum_jobs=wanted, maximum_jobs=wanted)  # a job that ends is replaced

@@ -106,3 +106,42 @@ def test_jobs_of_slurm_get_certificates_too(tmp_path, monkeypatch):
         keys = list((tmp_path / "cluster" / "slurm").iterdir())
         assert keys
         assert all(path.stat().st_mode & 0o077 == 0 for path in keys)
+
+
+SLURM = ("--cluster", "slurm:partition=cpu,cores=16", "--surfaces", "cone", "--faces", 300)
+
+
+@pytest.mark.parametrize("more", [("--dry-run",), ()])
+def test_slurm_without_its_command_is_said_at_once(cli, monkeypatch, more):
+    pytest.importorskip("dask_jobqueue")
+    monkeypatch.setattr("shutil.which", lambda name: None)
+    code, out, err = cli("run", "-a", "harmonic-circle", *SLURM, *more)
+    assert (code, out) == (2, "")
+    assert "sbatch is not on this machine" in " ".join(err.split())
+    assert not list(cli.folder.iterdir())
+
+
+def test_a_job_that_slurm_refuses_ends_the_run_with_its_cause(tmp_path):
+    """In a process of its own, since nothing may be left on its standard error."""
+    pytest.importorskip("dask_jobqueue")
+    commands = tmp_path / "bin"
+    commands.mkdir()
+    for name, text in (("sbatch", "echo invalid partition: $2 >&2; exit 1"), ("scancel", "exit 1")):
+        (commands / name).write_text(f"#!/bin/sh\n{text}\n", encoding="utf-8")
+        (commands / name).chmod(0o755)
+    command = [sys.executable, "-m", "cembench.commands.cli", "run", "-a", "harmonic-circle"]
+    known = {"PATH": f"{commands}{os.pathsep}{os.environ['PATH']}", "CEMBENCH_CACHE": str(tmp_path)}
+    ended = subprocess.run(
+        [*command, *map(str, SLURM), "-o", str(tmp_path / "run")],
+        env=os.environ | known,
+        capture_output=True,
+        encoding="utf-8",
+        timeout=300,
+        check=False,
+    )
+    assert ended.returncode == 2, ended.stderr
+    said = " ".join(ended.stderr.split())
+    assert "Slurm takes no job: " in said
+    assert "invalid partition" in said
+    assert "Traceback" not in ended.stderr
+    assert "internal error" not in said

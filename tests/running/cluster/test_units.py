@@ -70,7 +70,7 @@ def test_a_plug_in_travels_with_all_files_that_its_code_is_known_by(tmp_path, mo
     plugin = tmp_path / "mine.py"
     plugin.write_text(
         "import sys\nfrom pathlib import Path\nsys.path.insert(0, str(Path(__file__).parent))\n"
-        "import beside\n" + Path(FAULTY).read_text()
+        "import beside\n" + Path(FAULTY).read_text(encoding="utf-8")
     )
     registry = load_registry([str(plugin)])
     tasks = plan_cells(

@@ -18,7 +18,7 @@ def main(mode, given, left, *more):
     match mode:
         case "hangs":
             child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
-            Path(more[0]).write_text(f"{os.getpid()} {child.pid}")
+            Path(more[0]).write_text(f"{os.getpid()} {child.pid}", encoding="utf-8")
             time.sleep(600)
         case "hogs":
             kept = []
@@ -45,7 +45,7 @@ def main(mode, given, left, *more):
             Path(left).write_bytes(gzip.compress(Path(given).read_bytes()))
             return
         case "text":
-            Path(left).write_text("".join(f"{x!r} {y!r}\n" for x, y in uv))
+            Path(left).write_text("".join(f"{x!r} {y!r}\n" for x, y in uv), encoding="utf-8")
             return
         case "large":
             Path(left).write_bytes(b"# " + b"x" * 100_000_000)
@@ -98,7 +98,7 @@ def on_the_disk(V):
 
 def read(path):
     V, F = [], []
-    for line in Path(path).read_text().splitlines():
+    for line in Path(path).read_text(encoding="utf-8").splitlines():
         words = line.split()
         if words[0] == "v":
             V.append(tuple(map(float, words[1:4])))
@@ -118,7 +118,7 @@ def write(path, V, uv, F, mode):
         corners = [(i, at + k if moved else i) for k, i in enumerate(face)]
         faces.append("f " + " ".join(f"{v + 1}/{t + 1}" for v, t in corners))
     lines += [] if mode == "no-uv" else [f"vt {u!r} {v!r}" for u, v in uvs]
-    Path(path).write_text("\n".join([*lines, *faces]) + "\n")
+    Path(path).write_text("\n".join([*lines, *faces]) + "\n", encoding="utf-8")
 
 
 main(*sys.argv[1:])
