@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from cembench.api.fetch import fetch as fetch
     from cembench.api.map_files import map_files as map_files
     from cembench.api.morph_surfaces import morph as morph
+    from cembench.api.papers import check_paper as check_paper
     from cembench.api.parameterize import Result as Result
     from cembench.api.parameterize import parameterize as parameterize
     from cembench.api.parameterize_many import parameterize_many as parameterize_many
@@ -98,6 +99,7 @@ _PLACES = {
     "cembench.api.parameterize_many": ("parameterize_many",),
     "cembench.api.repair": ("Repair", "repair"),
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
+    "cembench.api.papers": ("check_paper",),
     "cembench.api.submissions": ("check_submissions", "submit"),
     "cembench.results.bundle": ("Submission",),
     "cembench.api.validate": ("validate",),

@@ -32,6 +32,7 @@ MODULES = {
         "submit": "api.submissions:submit",
         **{verb: f"commands.submit:{verb}" for verb in ("submissions", "publish", "sign")},
     },
+    "paper": {"paper": "commands.paper:paper"},
     "validate": {"validate": "api.validate:validate"},
     "peers": {"peers": "commands.peers:peers"},
     "exhibits": {},  # those of papers

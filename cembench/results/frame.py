@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from cembench.core.errors import ParameterError
+from cembench.core.names import did_you_mean
 from cembench.results.columns import significant
 from cembench.results.expressions import computed, names_in
 from cembench.results.families import (
@@ -195,11 +196,18 @@ def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) 
             known[name] = frame[name]
         elif name not in known:
             columns = sorted({str(column) for column in frame} - more.keys())
-            raise ParameterError(
-                f"{expression!r} names {name!r}; known are the functions "
-                f"{', '.join((*FUNCTIONS, *more))} and the columns {', '.join(columns)}."
-            )
+            raise ParameterError(unknown(expression, name, columns, more))
     return computed(expression, known)
+
+
+def unknown(expression: str, name: str, columns: Iterable[str], more: Iterable[str]) -> str:
+    """Return what to say of an unknown name in an expression: the nearest ones, then all."""
+    columns, functions = list(columns), [*FUNCTIONS, *more]
+    near = did_you_mean(name, [*functions, *columns])
+    return (
+        f"{expression!r} names {name!r}, which is not known.{near} Functions: "
+        f"{', '.join(functions)}. Columns: {', '.join(columns)}."
+    )
 
 
 def filled(text: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> str:

@@ -12,6 +12,7 @@ from __future__ import annotations
 import csv
 import importlib
 import importlib.util
+import re
 import sys
 import tomllib
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
@@ -48,6 +49,9 @@ _ELSEWHERE = {
     "runs": "runs.toml",
     "plots": "figures.toml",
 }
+
+#: The rows of a claim by default: on models of the paper, or on any surface if it names none.
+OF_MODELS, OF_ANY = "ok & main & chosen & model.notna()", "ok & main & chosen"
 
 #: Printed figures of a model by column; None where the paper has a dash.
 Row = Mapping[str, float | None]
@@ -121,6 +125,8 @@ class PrintedFigure(_Part):
     heading: str = ""
     digits: int = 2
     only: str = ""
+    #: The unit that seconds are printed in; they are shown in seconds.
+    unit: Literal["s", "ms", "min"] = "s"
 
 
 class PrintedTable(_Part):
@@ -176,7 +182,8 @@ class StatedClaim(_Part):
     plain : str
         What it says in a few plain words, for the list of all claims (default: the quote).
     rows : str
-        Which rows of the frame it is about.
+        Which rows of the frame it is about: by default those on models, or on any surface if the
+        paper names no model.
     algorithms : tuple of str
         Only rows of these, and only cases that have them all.
     per : tuple of str
@@ -203,7 +210,7 @@ class StatedClaim(_Part):
     place: str
     test: str
     plain: str = ""
-    rows: str = "ok & main & chosen & model.notna()"
+    rows: str = OF_MODELS
     algorithms: tuple[str, ...] = ()
     per: tuple[str, ...] = ("place", "surface")
     each: Mapping[str, str] = {}
@@ -213,7 +220,7 @@ class StatedClaim(_Part):
     figures: str = (
         "true on {held} of {tested} surfaces{listed('; not on ', surface[~holds], between=', ')}"
     )
-    none: str = ""
+    none: str = "no surface of this run is one that it is about"
     further: str = ""
     on: tuple[Literal["measured", "printed"], ...] = ("measured",)
     remark: str = ""
@@ -273,8 +280,9 @@ class Paper(_Part):
 
     @property
     def models(self) -> tuple[str, ...]:
-        """The models of the tables, in the paper's order."""
-        return tuple(dict.fromkeys(model for rows in self.tables.values() for model in rows))
+        """The models of the tables, in the paper's order; without tables those of `surfaces`."""
+        printed = tuple(dict.fromkeys(model for rows in self.tables.values() for model in rows))
+        return printed or tuple(self.surfaces)
 
     def table_of(self, column: str) -> int | None:
         """Return the number of the printed table with this column of the frame, if any."""
@@ -300,7 +308,7 @@ class Paper(_Part):
     def model_of(self, surface: str, faces: int) -> str:
         """Return the model that a surface of this name and size is by `surfaces`, or ""."""
         named = (model for model, name in self.surfaces.items() if name == surface)
-        return next((model for model in named if self.faces(model) == faces), "")
+        return next((model for model in named if self.faces(model) in (0, faces)), "")
 
     def object_of(self, model: str) -> str:
         """Return what a model shows: the name of its family, or its own."""
@@ -417,7 +425,8 @@ def read_paper(folder: Path, package: str = "") -> Paper:
             raise _wrong(folder / "tables.toml", "tables", "needs a number and the name of a file")
         if number in tables:
             raise _wrong(folder / "tables.toml", "tables", f"table {number} occurs twice")
-        printed[number], tables[number] = entry, _read_table(folder / file)
+        tables[number] = _scaled(_read_table(folder / file), entry, about.get("algorithms", ()))
+        printed[number] = entry
     parts = {
         **about,
         "tables": tables,
@@ -439,6 +448,12 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         what = what[0].lower() + what[1:]
         raise _wrong(file, ".".join(map(str, first["loc"])), what) from error
     _check(paper)
+    if not paper.models:
+        everywhere = [
+            claim.model_copy(update={"rows": OF_ANY}) if claim.rows == OF_MODELS else claim
+            for claim in paper.claims
+        ]
+        paper = paper.model_copy(update={"claims": tuple(everywhere)})
     return paper
 
 
@@ -461,7 +476,7 @@ def _check(paper: Paper) -> None:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
             raise _wrong(paper.folder, f"model {model!r}", what)
-    for model in paper.models:
+    for model in paper.models if paper.tables else ():
         if not paper.faces(model):
             what = f"no table has the column 'faces' for {model!r}"
             raise _wrong(paper.folder / "tables.toml", "tables", what)
@@ -513,18 +528,74 @@ def _entries(file: Path, read: Mapping[str, Any], name: str) -> list[dict[str, A
     return entries
 
 
-def _read_table(file: Path) -> dict[str, dict[str, str | None]]:
-    """Return the rows of a CSV file by its first column; empty cells are None."""
+#: How tables write that there is no figure.
+_GAPS = frozenset({"", "-", "\u2013", "\u2014", "n/a", "na", "nan", "none"})
+_NUMBER = re.compile(r"[+-]?\d+(?:,\d{3})*(?:\.\d*)?(?:e[+-]?\d+)?|[+-]?\.\d+", re.IGNORECASE)
+
+
+def cell_number(text: str) -> float | None:
+    """Return the number in a cell of a printed table, or None for a gap.
+
+    A deviation after ± is left out; commas may group thousands.
+
+    Raises
+    ------
+    ValueError
+        It is neither.
+
+    Examples
+    --------
+    >>> cell_number("54.5 ± 2.1"), cell_number("12,345"), cell_number("n/a")
+    (54.5, 12345.0, None)
+
+    """
+    figure = text.partition("±")[0].partition("+/-")[0].strip()
+    if figure.lower() in _GAPS:
+        return None
+    if not _NUMBER.fullmatch(figure):
+        raise ValueError(f"{text!r} is not a number")
+    return float(figure.replace(",", ""))
+
+
+def _scaled(
+    table: dict[str, dict[str, float | None]], entry: Mapping[str, Any], algorithms: Sequence[str]
+) -> dict[str, dict[str, float | None]]:
+    """Return a table with its figures of time in seconds, whatever unit they are printed in."""
+    figures = entry.get("figures", ())
+    for figure in figures if isinstance(figures, list) else ():
+        unit = figure.get("unit", "s") if isinstance(figure, dict) else "s"
+        if unit not in _SECONDS or unit == "s":
+            continue
+        power = _SECONDS[unit]
+        figure["digits"] = max(0, figure.get("digits", 2) + (3 if unit == "ms" else 0))
+        names = {figure.get("printed", "{}").format(name) for name in algorithms}
+        for row in table.values():
+            row |= {name: v * power for name in names if (v := row.get(name)) is not None}
+    return table
+
+
+#: Units of time in seconds.
+_SECONDS: Mapping[str, float] = {"s": 1.0, "ms": 1e-3, "min": 60.0}
+
+
+def _read_table(file: Path) -> dict[str, dict[str, float | None]]:
+    """Return the rows of a CSV file by its first column; gaps are None."""
     lines = list(csv.reader(_read_text(file).splitlines()))
     header, *rows = lines or [[]]
-    table: dict[str, dict[str, str | None]] = {}
+    table: dict[str, dict[str, float | None]] = {}
     for k, row in enumerate(rows, 2):
         if len(row) != len(header):
             raise _wrong(file, f"line {k}", f"{len(row)} cells, under {len(header)} headings")
         if row[0] in table:
             raise _wrong(file, f"line {k}", f"the model {row[0]!r} occurs twice")
-        cells = zip(header[1:], row[1:], strict=True)
-        table[row[0]] = {column: cell or None for column, cell in cells}
+        table[row[0]] = {}
+        for column, cell in zip(header[1:], row[1:], strict=True):
+            try:
+                table[row[0]][column] = cell_number(cell)
+            except ValueError as error:
+                where = f"line {k}, column {column!r}"
+                allowed = "allowed are 54.5, 54.5 ± 2.1, and n/a, a dash or nothing for a gap"
+                raise _wrong(file, where, f"{error}; {allowed}") from error
     return table
 
 

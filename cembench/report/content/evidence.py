@@ -33,6 +33,13 @@ if TYPE_CHECKING:
 DISK = "disk"
 #: The metric by which maps of all targets are compared: mean angle error in degrees.
 ANGLE = "angle_error_mean_deg"
+#: Columns of :attr:`Evidence.frame` besides those of records.
+FRAME_COLUMNS = (
+    *("surface", "place", "label", "series", "main", "ok", "model", "origin", "counted", "once"),
+    *("printed", "reference", "contest", "contested", "to", "as_good", "comparison", "speedup"),
+    *("speedup_low", "speedup_high", "verdict", "verdict_corrected", "p", "ratio", "ratios"),
+    *("paired", "cpu_ratio", "cpu_ratio_low", "cpu_ratio_high"),
+)
 #: A map is as good as another if its mean angle error is at most this many times as large, or this
 #: many degrees larger.
 AS_GOOD, DEGREES = 1.25, 0.25

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 
+from cembench.core.errors import ParameterError
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
 from cembench.report.content.claims import at_a_glance, claims, in_short
@@ -329,7 +330,14 @@ def _tables(run: _Run) -> Section | None:
 
 
 def _claims(run: _Run) -> Section:
-    tested = claims(run.evidence, run.seen)
+    tested, evidence = claims(run.evidence, run.seen), run.evidence
+    if evidence.asked and tested and not any(claim.parts for claim in tested):
+        names = ", ".join(evidence.paper.algorithms)
+        raise ParameterError(
+            f"no claim of {evidence.paper.title!r} is about a surface of this run: its algorithms "
+            f"are {names}, its models {', '.join(evidence.paper.models) or 'any surfaces'}. "
+            "`cembench paper check` tests the paper's folder."
+        )
     glance = [in_short(tested), at_a_glance(tested)] if tested else []
     return Section("claims", "Claims of the paper", (*glance, *tested))
 
