@@ -95,6 +95,7 @@ def _plain(facts: SurfaceFacts | None) -> dict[str, Any] | None:
 def catalogue(
     kind: Literal["algorithms", "surfaces"] | None = None,
     *,
+    target: Literal["disk", "free boundary", "circular holes", "atlas"] | None = None,
     measure: bool = False,
     plugins: Sequence[str] = (),
     reporter: Reporter = SILENT,
@@ -109,6 +110,8 @@ def catalogue(
     ----------
     kind : {"algorithms", "surfaces"}, optional
         List only these.
+    target : {"disk", "free boundary", "circular holes", "atlas"}, optional
+        List only algorithms, and of these those that map there.
     measure : bool
         Measure the stand-ins not yet measured (takes minutes).
     plugins : sequence of str
@@ -139,6 +142,11 @@ def catalogue(
         raise ParameterError.about(
             "{measure} is only for surfaces: leave it out, or add {kind:'surfaces'}."
         )
+    if target and kind == "surfaces":
+        raise ParameterError.about(
+            "{target} is only for algorithms: leave it out, or add {kind:'algorithms'}."
+        )
+    kind = "algorithms" if target else kind
     registry = registry_with(plugins, reporter)
     facts: dict[str, SurfaceFacts | None] = {}
     if kind == "surfaces":
@@ -152,7 +160,9 @@ def catalogue(
                 facts[family.name] = find_facts(registry, family)
             reporter.info(f"[{k}/{len(todo)}] {family.name}")
     return Catalogue(
-        None if kind == "surfaces" else tuple(registry.algorithms.values()),
+        None
+        if kind == "surfaces"
+        else tuple(a for a in registry.algorithms.values() if target in (None, a.target)),
         None if kind == "algorithms" else tuple(registry.surfaces.values()),
         tuple(registry.peers),
         facts,

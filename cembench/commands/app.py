@@ -42,7 +42,7 @@ MODULES = {
     "cut": {"cut": "api.cut:cut"},
 }
 #: Options after which no command is called: their answer needs the first lines of the help alone.
-OF_NO_COMMAND = ("-h", "--help", "--version")
+OF_NO_COMMAND = ("-h", "--help", "-V", "--version")
 
 app = typer.Typer(
     cls=Verbs,
@@ -68,7 +68,7 @@ def _global_options(
     version: Annotated[
         bool,
         typer.Option(
-            "--version", callback=_print_version, is_eager=True, help="Print the version."
+            "--version", "-V", callback=_print_version, is_eager=True, help="Print the version."
         ),
     ] = False,
 ) -> None:

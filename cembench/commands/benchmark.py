@@ -30,6 +30,10 @@ if TYPE_CHECKING:
 @from_api(
     benchmark,
     without=("watcher", "reporter"),
+    often=(
+        *("mesh", "surfaces", "algorithms", "faces", "rounds", "plugins", "parameters", "profile"),
+        *("output", "dry_run"),
+    ),
     sets="--set",
     limit="--limit N",
     precision="--precision SHARE",

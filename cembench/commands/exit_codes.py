@@ -78,7 +78,9 @@ class Verbs(TyperGroup):
         return command
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read a command line; without a word it asks for help."""
+        """Read a command line; without a word it asks for help, and so does `help VERB`."""
+        if args[:1] == ["help"]:
+            args = [*args[1:2], "--help"]
         return super().parse_args(ctx, args or ([] if ctx.resilient_parsing else ["--help"]))
 
     def invoke(self, ctx: Any) -> Any:

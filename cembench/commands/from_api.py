@@ -11,6 +11,7 @@ import math
 import os
 import re
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -24,6 +25,7 @@ from typer.models import ArgumentInfo
 from cembench.commands.console import assignments, hushed, split
 from cembench.core.arguments import Argument, arguments_of, summary_of
 from cembench.core.errors import CembenchError
+from cembench.core.names import did_you_mean
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _QUIET = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, and --json.")]
@@ -59,6 +61,7 @@ def from_api(
     without: Sequence[str] = (),
     only: Sequence[str] | None = None,
     defaults: Mapping[str, Any] = NONE,
+    often: Sequence[str] = (),
     **options: str,
 ) -> Callable[[Callable[..., None]], Callable[..., None]]:
     """Return a decorator that makes a command of a function of the API.
@@ -74,6 +77,8 @@ def from_api(
         text of its own; default: all others.
     defaults : mapping
         Defaults that this command has instead of the function's.
+    often : sequence of str
+        The arguments and options that most people need: the help shows them before the others.
     **options
         For an argument, its options where they do not follow from its name, and what its value is
         called in the help: ``output="-o --output FILE"``.
@@ -119,6 +124,11 @@ def from_api(
         more = [p.replace(kind=_KEYWORD) for p in [*own.values()][1:]]
         quiet = inspect.Parameter("quiet", _KEYWORD, default=False, annotation=_QUIET)
         arguments_first = sorted([*parameters, *more, quiet], key=_is_option)
+        if often:
+            arguments_first = [
+                one if one.name in often else _in_panel(one, "More options")
+                for one in sorted(arguments_first, key=partial(_place, often))
+            ]
         command.__signature__ = inspect.Signature(arguments_first)  # type: ignore[attr-defined]
         command.__name__, command.__module__ = body.__name__, body.__module__
         command.__doc__ = words(summary_of(function)) if only is None else body.__doc__
@@ -126,6 +136,17 @@ def from_api(
         return command
 
     return decorate
+
+
+def _place(often: Sequence[str], parameter: inspect.Parameter) -> int:
+    return often.index(parameter.name) if parameter.name in often else len(often)
+
+
+def _in_panel(parameter: inspect.Parameter, panel: str) -> inspect.Parameter:
+    """Return a parameter whose option the help shows in another panel."""
+    kind, info = parameter.annotation.__origin__, copy(parameter.annotation.__metadata__[0])
+    info.rich_help_panel = panel
+    return parameter.replace(annotation=Annotated[kind, info])
 
 
 def _is_option(parameter: inspect.Parameter) -> bool:
@@ -152,7 +173,7 @@ def _option_of(
     """Return the annotation and the default of an argument for the command-line library."""
     spelled = spelling.split()
     flags = [word for word in spelled if word.startswith("-")]
-    kind = _kind(argument)
+    kind, choices = _kind(argument), argument.choices or ()
     usual = _METAVARS.get(kind)
     metavar = next((word for word in spelled if not word.startswith("-")), usual)
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
@@ -161,6 +182,10 @@ def _option_of(
     elif len(allowed := ", ".join(argument.choices or ())) > LONG:
         metavar, repeatable = metavar or "NAME", f" One of {allowed}."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
+    if choices and not argument.many:
+        more |= {"parser": partial(one_of, choices)}
+        more["metavar"] = more["metavar"] or f"[{'|'.join(choices)}]"
+        kind = str
     if kind in (int, float) and argument.range is not None:
         least, most = argument.range.least, argument.range.most
         more |= {"min": least, "max": most if most < MANY else None}
@@ -205,6 +230,14 @@ def _value(argument: Argument, passed: Any) -> Any:
         return assignments(passed)
     items = split(list(passed)) if _is_split(argument) else passed
     return items or argument.default
+
+
+def one_of(choices: Sequence[str], value: str) -> str:
+    """Return a word that is one of the choices; the error has the nearest of them."""
+    if value not in choices:
+        near = did_you_mean(value, choices)
+        raise typer.BadParameter(f"{value!r} is not one of {', '.join(choices)}.{near}")
+    return value
 
 
 def finite(value: float | None) -> float | None:

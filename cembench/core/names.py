@@ -66,15 +66,16 @@ MOST_NAMED = 60
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
-    """Return a message for an unknown name, with the known ones and those that are spelled alike.
+    """Return a message for an unknown name, with those that are spelled alike before all others.
 
     >>> unknown("metric", "image_aera", ["dirichlet_energy", "image_area"])
-    "unknown metric 'image_aera'; known: dirichlet_energy, image_area. Did you mean image_area?"
+    "unknown metric 'image_aera'. Did you mean image_area? Known: dirichlet_energy, image_area."
     """
     known = sorted(known)
     names = ", ".join(known[:MOST_NAMED]) or "none"
     names += f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
-    return f"unknown {kind} {name!r}; known: {names}.{did_you_mean(name, known)}"
+    near = did_you_mean(name, known)
+    return f"unknown {kind} {name!r}{f'.{near} Known' if near else '; known'}: {names}."
 
 
 def slug(name: str, longest: int = LONGEST) -> str:

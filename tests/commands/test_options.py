@@ -2,6 +2,7 @@
 
 import inspect
 import json
+import re
 
 import pytest
 import typer
@@ -142,3 +143,52 @@ def test_every_number_of_every_verb_has_both_bounds():
 
 def test_the_bounds_of_a_typer_option_are_called_min_and_max():
     assert {"min", "max"} <= set(inspect.signature(typer.Option).parameters)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("-V",), "cembench 0."),
+        (("help",), "Commands:"),
+        (("help", "cut"), "cut [OPTIONS]"),
+        (("list", "algorithms", "--target", "circular holes"), "direct-cem-holes"),
+    ],
+)
+def test_what_people_type_for_help_is_understood(cli, words, said):
+    code, out, _ = cli(*words)
+    assert code == 0
+    assert said in out
+
+
+def test_algorithms_of_one_target_are_listed_alone(cli):
+    out = cli("list", "--target", "free boundary", "--json")[1]
+    targets = {one["target"] for one in json.loads(out)["algorithms"]}
+    assert targets == {"free boundary"}
+    assert "surfaces" not in json.loads(out)
+    assert cli("list", "surfaces", "--target", "disk")[0] == 2
+
+
+@pytest.mark.parametrize(
+    ("words", "near"),
+    [
+        (("list", "algoritms"), "Did you mean algorithms?"),
+        (("map", "face.obj", "--uv", "unt"), "Did you mean unit?"),
+    ],
+)
+def test_a_misspelt_choice_has_a_suggestion(cli, words, near):
+    code, _, err = cli(*words)
+    assert code == 2
+    assert near in re.sub(r"[\s│]+", " ", err)
+
+
+def test_a_suggestion_comes_before_the_list_of_all_names(cli):
+    err = cli("run", "--surfaces", "cone", "-a", "ceem")[2]
+    assert err.index("Did you mean cem") < err.index("abf++")
+
+
+def test_the_help_of_run_shows_first_what_most_people_need(cli, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = cli("run", "--help")[1]
+    first = out.partition("More options")[0]
+    assert len(re.findall(r"(?m)^│ --", first)) == 10
+    assert all(f"--{name}" in first for name in ("mesh", "algorithms", "plugin", "output"))
