@@ -35,6 +35,7 @@ from cembench.report.plot_rows import (
     ROWS,
     UNSEEN,
     Inspections,
+    average,
     cost_ratios,
     front,
     power_law,
@@ -121,6 +122,8 @@ class DeclaredPlot(Declaration):
     title: str
     panels: tuple[DeclaredPanel, ...] = Field(min_length=1)
     columns: int = Field(2, ge=1)
+    #: Whether panels whose axes have the same title have the same range.
+    shared: bool = False
     caption: str = ""
     alternative: str = ""
     #: What the caption says in place of {left_out}, with the algorithms in braces.
@@ -245,6 +248,7 @@ def declared_plot(
         spec.alternative,
         spec.figure,
         spec.columns,
+        spec.shared,
     )
 
 
@@ -353,10 +357,15 @@ def _points(evidence: Evidence, spec: DeclaredPanel, frame: pd.DataFrame) -> _Dr
             absent = 0.0 if spec.kind == "stack" else None
             x, y = [x for _, x in places], [held.get(place, absent) for place in places]
         about = tooltips if spec.tooltip and not named else ()
-        series.append(PlotSeries(name, x, y, cast(Kind, spec.kind), styles[name], about))
+        kind = "cloud" if spec.overlay == "front" else spec.kind
+        named_here = spec.overlay != "front"
+        series.append(PlotSeries(name, x, y, cast(Kind, kind), styles[name], about, named_here))
         if spec.overlay == "power-law" and (line := power_law(name, clouds[name], styles[name])):
             series.append(line)
     if spec.overlay == "front":
+        for name, cloud in clouds.items():
+            own = points[points[spec.series] == name]
+            series.append(average(name, cloud, own["family"].tolist(), styles[name]))
         series.append(front(clouds))
     panel = PlotPanel(spec.x.axis(), spec.y.axis(), tuple(series))
     left_out = names[spec.most :] if spec.most else ()

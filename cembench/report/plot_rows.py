@@ -20,6 +20,7 @@ from cembench.report.document import Column, Table, Value, entry, missing, words
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.plots import PlotSeries, Point, through
 from cembench.results.expressions import with_words
+from cembench.results.families import average_interval
 from cembench.results.multiple_testing import geometric
 from cembench.results.papers import Paper
 from cembench.results.power_law import FEWEST, fit
@@ -47,11 +48,14 @@ def _iterations(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> p
 
 
 def _phases(evidence: Evidence, frame: pd.DataFrame, seen: Inspections) -> pd.DataFrame:
-    """Return means over surfaces by algorithm and phase: `share` in percent, `phase_seconds`."""
+    """Return means over surfaces by algorithm and phase: `share` in percent, `phase_seconds`.
+
+    Algorithms whose time is not divided, such as plug-ins, have no row.
+    """
     import pandas as pd
 
     rows: list[dict[str, Any]] = []
-    timed = frame[frame["phases"].astype(bool)]
+    timed = frame[[bool(set(phases or ()) - {"other"}) for phases in frame["phases"]]]
     for _, group in timed.groupby(["solves", "series"], sort=False):
         about = group.iloc[0].to_dict()
         calls, n = list(group["phases"]), len(group)
@@ -154,6 +158,20 @@ def power_law(label: str, points: Sequence[Point], style: SeriesStyle) -> PlotSe
     return PlotSeries(f"{label}, fitted", ends, line, "line", style, tooltips, named=False)
 
 
+def average(
+    label: str, cloud: Sequence[Point], families: Sequence[str], style: SeriesStyle
+) -> PlotSeries:
+    """Return the geometric mean of a cloud, with 95 % intervals over families if there are six."""
+    sides = list(zip(*[point[:2] for point in cloud], strict=True))
+    x, y = (float(geometric(np.array(side, dtype=float))) for side in sides)
+    intervals = [average_interval(side, families) for side in sides]
+    ends = None
+    if intervals[0] and intervals[1]:
+        ends = ((intervals[0].low, intervals[0].high), (intervals[1].low, intervals[1].high))
+    words = [f"{label}: average over {len(cloud)} surfaces"]
+    return PlotSeries(label, [x], [y], "mean", style, words, ends=ends)
+
+
 def front(clouds: Mapping[str, Sequence[Point]]) -> PlotSeries:
     """Return the geometric means of clouds of points that none of the others beats in x and y."""
     means = []
@@ -165,7 +183,7 @@ def front(clouds: Mapping[str, Sequence[Point]]) -> PlotSeries:
         return one.x <= other.x and one.y <= other.y and one[:2] != other[:2]
 
     best = sorted(m for m in means if not any(beats(other, m) for other in means))
-    return through("not beaten on average", best, "both", PLAIN)
+    return through("not beaten on average", best, "line", PLAIN)
 
 
 def cost_ratios(frame: pd.DataFrame, cost: pd.Series, least: float = 0.0) -> pd.DataFrame:

@@ -29,8 +29,9 @@ from cembench.report.document import Figure, Item
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.shared_drawing import draw
 
-#: How a series is drawn: points, joined points, a staircase, or bars side by side or stacked.
-Kind = Literal["line", "points", "both", "steps", "bars", "stack"]
+#: How a series is drawn: points, joined points, a staircase, bars side by side or stacked, faint
+#: points, or large marks with intervals.
+Kind = Literal["line", "points", "both", "steps", "bars", "stack", "cloud", "mean"]
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,8 @@ class PlotSeries:
     words: Sequence[str] = ()
     #: Whether it is in the legend; one of several series with the same name is enough.
     named: bool = True
+    #: Of a mean: the ends of its intervals in x and in y, where it has them.
+    ends: tuple[tuple[float, float], tuple[float, float]] | None = None
 
 
 class Point(NamedTuple):
@@ -99,6 +102,14 @@ class Plot:
     alternative: str = ""
     paper: str = ""
     columns: int = 2
+    #: Whether panels whose axes have the same title have the same range.
+    shared: bool = False
+
+    @property
+    def across(self) -> int:
+        """Number of panels in a row; three make a row of their own, with no empty place."""
+        n = len(self.panels)
+        return n if n == 3 else min(self.columns, n)
 
 
 #: The files of a plot: its formats, the first of which is the one to show.
@@ -184,7 +195,7 @@ def _plain(value: Any) -> Any:
 
 def _drawn(plot: Plot) -> dict[str, bytes]:
     """Return the contents of the files by format, PNG first."""
-    columns = min(plot.columns, len(plot.panels))
+    columns = plot.across
     rows = -(-len(plot.panels) // columns)
     tall = max((_width_of_names(panel) for panel in plot.panels), default=0.0)
     with rc_context(_STYLE), warnings.catch_warnings():
@@ -200,6 +211,8 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         FigureCanvasAgg(canvas)
         for k, panel in enumerate(plot.panels):
             _draw_panel(canvas.add_subplot(rows, columns, k + 1), panel)
+        if plot.shared:
+            _share(canvas.axes)
         _draw_legend(canvas, across)
         ConstrainedLayoutEngine().execute(canvas)  # once: a canvas would repeat it in each format
         contents = {}
@@ -244,13 +257,34 @@ def _draw_panel(axes: Axes, panel: PlotPanel) -> None:
             bottom[x.astype(int)] += np.nan_to_num(y)
         else:
             style: dict[str, Any] = {"color": look.colour, "label": label, "linewidth": 1.5}
-            style["linestyle"] = "" if series.kind == "points" else look.dash[0]
+            alone = series.kind in ("points", "cloud", "mean")
+            style["linestyle"] = "" if alone else look.dash[0]
             if series.kind == "steps":
                 style["drawstyle"] = "steps-post"
             if series.kind in ("points", "both"):
                 style |= {"marker": look.marker[0], "markersize": 4.5}
+            elif series.kind == "cloud":
+                style |= {"marker": look.marker[0], "markersize": 3, "alpha": 0.3, "mew": 0}
+            elif series.kind == "mean":
+                style |= {"marker": look.marker[0], "markersize": 9, "mec": "white", "zorder": 3}
+                if series.ends:
+                    axes.hlines(y, *series.ends[0], colors=look.colour, lw=1.5)
+                    axes.vlines(x, *series.ends[1], colors=look.colour, lw=1.5)
             axes.plot(x, y, **style)
     _draw_axes(axes, panel, names)
+
+
+def _share(panels: Sequence[Axes]) -> None:
+    """Give axes with the same title the range of all of them."""
+    for title, ends in (
+        (Axes.get_xlabel, (Axes.get_xlim, Axes.set_xlim)),
+        (Axes.get_ylabel, (Axes.get_ylim, Axes.set_ylim)),
+    ):
+        for name in {title(panel) for panel in panels}:
+            alike = [panel for panel in panels if title(panel) == name]
+            lows, highs = zip(*map(ends[0], alike), strict=True)
+            for panel in alike if name else ():
+                ends[1](panel, min(lows), max(highs))
 
 
 def _draw_axes(axes: Axes, panel: PlotPanel, names: Sequence[str]) -> None:
@@ -325,7 +359,7 @@ def _legend_columns(names: Sequence[str], inches: float) -> int:
 
 def plotly_of(plot: Plot) -> dict[str, Any]:
     """Return the plot as a Plotly figure: ``data`` and ``layout``, ready for JSON."""
-    columns = min(plot.columns, len(plot.panels))
+    columns = plot.across
     rows = -(-len(plot.panels) // columns)
     data: list[dict[str, Any]] = []
     layout: dict[str, Any] = {
@@ -339,8 +373,15 @@ def plotly_of(plot: Plot) -> dict[str, Any]:
     shown: set[str] = set()
     for k, panel in enumerate(plot.panels):
         suffix = "" if k == 0 else str(k + 1)
-        layout[f"xaxis{suffix}"] = _plotly_axis(panel.x) | _whole_ticks(panel)
-        layout[f"yaxis{suffix}"] = _plotly_axis(panel.y)
+        values = [(series.x, series.y) for series in panel.series]
+        across, up = ([v for one in side for v in one] for side in zip(*values, strict=True))
+        layout[f"xaxis{suffix}"] = _plotly_axis(panel.x, across) | _whole_ticks(panel)
+        layout[f"yaxis{suffix}"] = _plotly_axis(panel.y, up)
+        for side, axis in (("x", panel.x), ("y", panel.y)):
+            same = [p for p in plot.panels[:k] if getattr(p, side).title == axis.title]
+            if plot.shared and same and axis.title:
+                first = plot.panels.index(same[0])
+                layout[f"{side}axis{suffix}"]["matches"] = f"{side}{first + 1 if first else ''}"
         if panel.title:
             layout["annotations"].append(
                 {
@@ -363,10 +404,18 @@ def plotly_of(plot: Plot) -> dict[str, Any]:
     return {"data": data, "layout": layout}
 
 
-def _plotly_axis(axis: Axis) -> dict[str, Any]:
+def _plotly_axis(axis: Axis, values: Sequence[Any]) -> dict[str, Any]:
+    """Describe an axis; a logarithmic one has the labels that it has in the still picture."""
     described: dict[str, Any] = {"title": {"text": axis.title}, "automargin": True}
+    known = [v for v in values if not isinstance(v, str) and v and v > 0]
     if axis.log:
         described |= {"type": "log", "dtick": 1, "exponentformat": "power"}
+    if axis.log and known and (span := max(known) / min(known)) < DECADES:
+        low_high = axis.low or min(known), axis.high or max(known)
+        locate = MaxNLocator(5, steps=(1, 2, 5, 10)) if span < SHORT else LogLocator(subs=(1, 2, 5))
+        ticks = [float(v) for v in locate.tick_values(*low_high) if v > 0]
+        texts = [f"{v:g}" if span < SHORT else _tick(v) for v in ticks]
+        described |= {"tickmode": "array", "tickvals": ticks, "ticktext": texts}
     if axis.low is not None or axis.high is not None:
         ends = [axis.low, axis.high]
         described["range"] = [np.log10(e).item() if e and axis.log else e for e in ends]
@@ -398,10 +447,23 @@ def _plotly_trace(series: PlotSeries) -> dict[str, Any]:
     look = series.look
     if series.kind in ("bars", "stack"):
         return trace | {"type": "bar", "marker": {"color": look.colour}}
-    mode = {"points": "markers", "both": "lines+markers"}.get(series.kind, "lines")
+    marked = dict.fromkeys(("points", "cloud", "mean"), "markers") | {"both": "lines+markers"}
+    mode = marked.get(series.kind, "lines")
     trace |= {"type": "scatter", "mode": mode}
     trace["line"] = {"color": look.colour, "dash": look.dash[1]}
     if series.kind == "steps":
         trace["line"]["shape"] = "hv"
     trace["marker"] = {"color": look.colour, "symbol": look.marker[1]}
+    if series.kind == "cloud":
+        trace["marker"] |= {"opacity": 0.3, "size": 4}
+    if series.kind == "mean":
+        trace["marker"] |= {"size": 12}
+    if series.ends:
+        values = series.x[0], series.y[0]
+        for side, value, (low, high) in zip("xy", values, series.ends, strict=True):
+            middle = float(value or 0)
+            trace[f"error_{side}"] = {
+                **{"type": "data", "symmetric": False, "color": look.colour, "thickness": 1.5},
+                **{"array": [high - middle], "arrayminus": [middle - low]},
+            }
     return trace

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cembench.report.content.evidence import Evidence, model_surface
@@ -33,9 +33,22 @@ def figures_section(evidence: Evidence, seen: Inspections, folder: Path) -> Sect
     cost = declared_plot(evidence, "cost-by-faces")
     over = [paper_plot(evidence, name, seen) for name in OVER_MODELS]
     items += drawn([*plots, cost, exponents_table(evidence), *over], folder)
-    return Section("figures", "Figures of the paper", (*items, *gaps, *exhibit_gaps(evidence)))
+    missing = [*_together(gaps), *exhibit_gaps(evidence)]
+    return Section("figures", "Figures of the paper", (*items, *missing))
 
 
+def _together(gaps: Sequence[Gap]) -> list[Gap]:
+    """Return gaps with one for all that the run has no surface for."""
+    absent = [gap for gap in gaps if gap.why.endswith(NO_SURFACE)]
+    rest = [gap for gap in gaps if gap not in absent]
+    if len(absent) < 2:
+        return [*gaps]
+    titles = "; ".join(gap.title for gap in absent)
+    return [*rest, Gap(f"{len(absent)} panels", f"{NO_SURFACE} {titles}")]
+
+
+#: Why a figure lacks a model.
+NO_SURFACE = "no surface of this run is or stands in for"
 #: Plots of a paper with a panel for each of some models, and of one with all of them.
 OF_MODELS = ("energy-by-iteration", "angle-histograms")
 OVER_MODELS = ("energy-over-models", "angles-over-models")
@@ -64,14 +77,10 @@ def _gap(evidence: Evidence, seen: Inspections, model: str, figure: str) -> Gap:
     title = f"{figure}: {model}"
     if surface and record and record.outcome.status == "ok" and not seen[surface.mesh_hash].kept:
         return Gap(title, seen[surface.mesh_hash].missing_reason)
-    why = (
-        evidence.missing_reason(record)
-        if surface
-        else "no surface of this run is or stands in for it"
-    )
+    why = evidence.missing_reason(record) if surface else NO_SURFACE
     return Gap(
         title,
-        f"no map of {model} by {evidence.reference_label}: {why}.",
+        f"no map of {model} by {evidence.reference_label}: {why}",
         f"cembench run --surfaces {model_surface(model)} -a {evidence.reference} "
         f"-o {evidence.store.folder}",
     )

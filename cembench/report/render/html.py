@@ -28,6 +28,7 @@ from urllib.parse import quote
 import jinja2
 from markupsafe import Markup, escape
 
+from cembench.conformal.metrics import METRICS
 from cembench.core.atomic import write_text
 from cembench.core.extras import Extra, missing
 from cembench.core.names import in_lists
@@ -53,6 +54,7 @@ from cembench.report.pictures import (
     unreadable,
 )
 from cembench.report.render import templates
+from cembench.results.columns import COLUMNS
 
 #: The facets, each with the columns of a record whose values name a choice.
 FACETS: Mapping[str, tuple[str, ...]] = {
@@ -420,10 +422,32 @@ def _short_keys(records: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _record(key: str, row: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return a record for the page: its cell and all available figures."""
+    """Return a record for the page: its cell, what is looked at most, and all fields."""
     title = " · ".join(str(row[name]) for name in ("mesh", "algorithm") if row.get(name))
     shown = {name: value for name, value in row.items() if value not in (None, "", [], {}, ())}
-    return {"title": title or key, "fields": [(n, _entries(v)) for n, v in shown.items()]}
+    fields = [(n, _entries(v)) for n, v in shown.items()]
+    return {"title": title or key, "head": list(_head(shown)), "fields": fields}
+
+
+METRIC_TITLES = {metric.name: metric.title for metric in METRICS}
+#: What a record opens with: the columns, in this order, before the metrics.
+_FIRST = ("mesh", "vertices", "faces", "title", "target", "status", "cause", "seconds_raw")
+
+
+def _head(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    """Yield what is looked at most: names, seconds of each round, and metrics, to four digits."""
+    headings = {"seconds_raw": "seconds of each round", "mesh": "surface", "title": "algorithm"}
+    names = [name for name in (*_FIRST, *(m.name for m in METRICS), "iterations") if name in row]
+    for name in names:
+        column, value = COLUMNS[name], row[name]
+        heading = headings.get(name) or METRIC_TITLES.get(name) or column.heading or name
+        if isinstance(value, list | tuple):
+            text = ", ".join(f"{v:.4g}" for v in value if isinstance(v, int | float))
+        else:
+            text = f"{value:.4g}" if isinstance(value, float) else str(value)
+            text = f"{value:,}" if type(value) is int else text
+        unit = "s" if name == "seconds_raw" else column.unit
+        yield heading, f"{text} {unit}".rstrip()
 
 
 def _entries(value: Any) -> list[tuple[str, str]]:

@@ -148,12 +148,14 @@
   }
 
   function recordArticle(key) {
-    const { title: name, fields } = store.records[key];
+    const { title: name, head, fields } = store.records[key];
     const entry = ([inner, words]) => (inner
       ? element("span", { className: "entry" }, element("i", { textContent: inner }), ` ${words}`) : words);
-    return element("article", { className: "record" }, element("h3", { textContent: name }),
-      element("dl", {}, ...fields.map(([field, entries]) => element("div", {},
-        element("dt", { textContent: field }), element("dd", {}, ...entries.map(entry))))));
+    const list = (pairs) => element("dl", {}, ...pairs.map(([field, ...words]) => element("div", {},
+      element("dt", { textContent: field }), element("dd", {}, ...words))));
+    return element("article", { className: "record" }, element("h3", { textContent: name }), list(head),
+      element("details", {}, element("summary", { textContent: "All fields" }),
+        list(fields.map(([field, entries]) => [field, ...entries.map(entry)]))));
   }
 
   function listRecords() {
