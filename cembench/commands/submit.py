@@ -139,7 +139,8 @@ def publish(
     if as_json:
         print_json({"output": str(output), "runs": [asdict(one) for one in site]})
     else:
-        out.print(f"{len(site)} runs in {output / 'index.html'}", soft_wrap=True)
+        runs_words = f"{len(site)} run{'s' * (len(site) > 1)}"
+        out.print(f"{runs_words} in {output / 'index.html'}", soft_wrap=True)
 
 
 @app.command(epilog="Example:  cembench sign results/may --key ~/.ssh/id_ed25519")

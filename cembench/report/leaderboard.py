@@ -11,25 +11,35 @@ from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
-from math import inf
+from math import exp, inf, log
+from pathlib import Path
+from statistics import fmean
 from typing import TYPE_CHECKING, Any
 
 from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant, difference
+from cembench.report.content.standings import title_of
 from cembench.report.declarations import filled, own, parsed
 from cembench.report.declared import DeclaredTable, aggregate
 from cembench.report.document import (
     Column,
+    Figure,
+    Findings,
     Gap,
     Item,
     Plain,
     Report,
     Section,
     Table,
+    Text,
     Value,
     missing,
 )
+from cembench.report.palette import series_styles
+from cembench.report.plot_rows import average, front
+from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.columns import significant
+from cembench.results.families import average_interval, family_means
 from cembench.results.machines import machine_of, machine_of_record
 
 if TYPE_CHECKING:
@@ -37,8 +47,8 @@ if TYPE_CHECKING:
 
     from cembench.registry import Registry
 
-#: Degrees below which angle errors count as equal: nobody sees them.
-UNSEEN = 0.01
+#: Degrees below which angle errors count as equal: nobody sees them; and the share of them.
+UNSEEN, NEAR = 0.01, 0.01
 
 #: What an opened record shows.
 _SHOWN = (
@@ -60,19 +70,33 @@ class Entrant:
     signer: str = ""
 
 
-def leaderboard(entrants: Sequence[Entrant], command: str) -> Report:
-    """Return the leaderboard of several runs, with a page for the angles of each target."""
+def leaderboard(entrants: Sequence[Entrant], command: str, folder: Path | None = None) -> Report:
+    """Return the leaderboard of several runs; its plot is drawn into `folder`, if given.
+
+    It opens with a ranked table for each target, and with accuracy against time.
+    """
     frame = _frame(entrants)
     valid = frame[frame["ok"] & frame["main"]]
     targets = sorted(valid["target"].unique(), key=lambda target: (target != DISK, target))
     angles = tuple(_angles(valid[valid["target"] == target], target) for target in targets)
+    plot = _plot(valid, targets)
+    figure = write_plot(plot, folder) if plot and folder else None
+    ranked = [_ranked(valid[valid["target"] == target], target) for target in targets]
+    head = Findings(
+        (_leader_words(ranked),), tables=tuple(table for table, _ in ranked), plot=figure
+    )
     cells = Section("cells", "Every cell of every run", (_cells(frame),), page=True)
     sections = (
-        Section("angles", "Whose maps have the smallest angle errors?", angles),
+        Section("angles", "Whose maps have the smallest angle errors?", (*angles, *_one(figure))),
         Section("seconds", "Who is fastest at equal angles?", _seconds(valid, targets)),
         Section("success", "Whose maps are valid?", (_success(frame),)),
         Section("machines", "Machines", (_machines(entrants),)),
-        Section("measured", "Every cell", sections=(cells,)),
+        Section(
+            "measured",
+            "Every cell",
+            (Text("Every cell of every run, with its record, is on a page of its own:"),),
+            (cells,),
+        ),
     )
     about = (
         ("runs", str(len(entrants))),
@@ -81,7 +105,119 @@ def leaderboard(entrants: Sequence[Entrant], command: str) -> Report:
         ("cells", f"{len(frame):,}, {int(frame['ok'].sum()):,} ok"),
     )
     rows = {row["record"]: row for row in frame.to_dict("records")}
-    return Report("Leaderboard", command, about, sections, _shown(rows))
+    return Report("Leaderboard", command, about, sections, _shown(rows), head)
+
+
+def _one(figure: Figure | None) -> tuple[Figure, ...]:
+    return () if figure is None else (figure,)
+
+
+def _over_least(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return maps to one target with their angle errors over the least on the surface."""
+    once = rows[rows[ANGLE].notna()].sort_values([ANGLE, "record"])
+    once = once.drop_duplicates(["label", "mesh_hash"])
+    least = once.groupby("mesh_hash")[ANGLE].transform("min")
+    return once.assign(ratio=once[ANGLE].clip(lower=UNSEEN) / least.clip(lower=UNSEEN))
+
+
+#: Within each of these, seconds are comparable.
+_PLACE = ["run", "machine", "mesh_hash", "solves", "target"]
+
+
+def _over_fastest(rows: pd.DataFrame) -> pd.DataFrame:
+    """Return timed maps with their seconds over the fastest as good ones of the same place."""
+    known = rows[rows["seconds"].notna()]
+    good = known["seconds"].where(known["as_good"].astype(bool))
+    return known.assign(
+        ratio=known["seconds"] / good.groupby([known[n] for n in _PLACE]).transform("min")
+    )
+
+
+def _ranked(rows: pd.DataFrame, target: str) -> tuple[Table, list[str]]:
+    """Return the algorithms of a target, the smallest angle errors first, and their order."""
+    angles, seconds = _over_least(rows), _over_fastest(rows).dropna(subset="ratio")
+    means = {label: _average(group) for label, group in angles.groupby("label")}
+    order = sorted(means, key=lambda label: (means[label].number or inf, label))
+    times = {label: _average(group) for label, group in seconds.groupby("label")}
+    entries: list[list[Plain]] = []
+    for label in order:
+        own = angles[angles["label"] == label]
+        best = int((own["ratio"] <= 1 + NEAR).sum())
+        counts = Value(f"{best} of {len(own)}", float(best), "derived")
+        lacking = missing("not timed beside a map as good as the best")
+        entries.append([label, means[label], counts, times.get(label, lacking)])
+    columns = [Column("algorithm", numeric=False)]
+    columns += [
+        Column("angle error over the least"),
+        Column("best on"),
+        Column("seconds over the fastest"),
+    ]
+    note = (
+        f"Over {angles['mesh_hash'].nunique()} surfaces: geometric means over the objects that "
+        "they show, with 95 % intervals where there are six. Best on: within 1 % of the least "
+        "error of a surface. Seconds are over those of the fastest map that is about as good as "
+        "the best, in the same run on the same machine."
+    )
+    title = f"{title_of(target)}, ranked by their angle errors"
+    return Table.of(f"ranked-{slug(target)}", title, columns, entries, notes=(note,)), order
+
+
+def _average(rows: pd.DataFrame) -> Value:
+    """Return the geometric mean of ratios over objects, with its interval, as an entry."""
+    ratios, objects = rows["ratio"].tolist(), rows["object"].tolist()
+    mean = exp(fmean(family_means(list(map(log, ratios)), objects)))
+    interval = average_interval(ratios, objects)
+    text = f"{mean:.2f}" + (f" ({interval.low:.2f} to {interval.high:.2f})" if interval else "")
+    ordered = rows.sort_values(["ratio", "record"])
+    return Value(text, mean, "derived", str(ordered.iloc[(len(ordered) - 1) // 2]["record"]))
+
+
+def _leader_words(ranked: Sequence[tuple[Table, list[str]]]) -> tuple[str]:
+    """Return who leads for each target, in words."""
+    parts = [
+        f"{table.title.partition(',')[0]}: {order[0]} has the smallest angle errors of "
+        f"{len(order)} algorithms."
+        for table, order in ranked
+        if len(order) > 1
+    ]
+    return (" ".join(parts) or "No two algorithms map to the same target.",)
+
+
+def _plot(valid: pd.DataFrame, targets: Sequence[str]) -> Plot | None:
+    """Return accuracy against time for each target with several algorithms; None without any."""
+    styles, panels = series_styles(sorted(valid["label"].unique())), []
+    for target in targets:
+        own = valid[valid["target"] == target]
+        errors = _over_least(own).set_index(["label", "mesh_hash"])["ratio"]
+        timed = _over_fastest(own).dropna(subset="ratio")
+        if timed["label"].nunique() < 2:
+            continue
+        clouds: dict[str, list[Point]] = {}
+        objects: dict[str, list[str]] = {}
+        for row in timed.to_dict("records"):
+            place = row["label"], row["mesh_hash"]
+            if place in errors.index:
+                clouds.setdefault(row["label"], []).append(
+                    Point(row["ratio"], float(errors[place]), str(row["surface"]))
+                )
+                objects.setdefault(row["label"], []).append(row["object"])
+        series = [through(n, c, "cloud", styles[n], named=False) for n, c in clouds.items()]
+        series += [average(n, c, objects[n], styles[n]) for n, c in clouds.items()]
+        axes = (
+            Axis("time, times the fastest", log=True),
+            Axis("angle error, times the least", log=True),
+        )
+        panels.append(PlotPanel(*axes, (*series, front(clouds)), target))
+    caption = (
+        "Large marks are geometric means over surfaces, with 95 % intervals where they show six "
+        "objects; (1, 1) is best in both."
+    )
+    title = "Accuracy against time"
+    return (
+        Plot("leaders", title, tuple(panels), caption, "Points for each algorithm.")
+        if panels
+        else None
+    )
 
 
 def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
@@ -100,6 +236,7 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
         records = [evidence.by_key[key] for key in frame["key"]]
         frame = frame.assign(
             run=entrant.name,
+            object=frame["family"],
             label=[apart.get(label, label) for label in frame["label"]],
             record=[f"{number:03d}{key}" for key in frame["key"]],
             machine=[machine_of_record(record, environments) for record in records],
@@ -151,24 +288,19 @@ def family(name: str, mesh_hash: str, origin: str, registry: Registry) -> str:
 
 def _angles(valid: pd.DataFrame, target: str) -> Item:
     """Compare angle errors with the least on each surface, over all machines."""
-    known = valid[valid[ANGLE].notna()]
     title = f"Mean angle errors, {target}"
-    if known.empty:
-        return Gap(title, "no valid map has one")
     # A row an algorithm and surface: machines give the same map, up to rounding.
-    once = known.sort_values([ANGLE, "record"]).drop_duplicates(["label", "mesh_hash"])
-    least = once.groupby("mesh_hash")[ANGLE].transform("min")
-    once = once.assign(ratio=once[ANGLE].clip(lower=UNSEEN) / least.clip(lower=UNSEEN))
+    once = _over_least(valid)
+    if once.empty:
+        return Gap(title, "no valid map has one")
     return _compared("angles", f"angles-{slug(target)}", title, once)
 
 
 def _seconds(valid: pd.DataFrame, targets: Sequence[str]) -> tuple[Item, ...]:
     """Compare the seconds of maps about as good as the best to their target, within each run."""
     title, tables = "Seconds at equal angles", []
-    known = valid[valid["as_good"] & valid["seconds"].notna()]
-    place = ["run", "machine", "mesh_hash", "solves", "target"]
-    known = known[known.groupby(place)["label"].transform("nunique") > 1]
-    known = known.assign(ratio=known["seconds"] / known.groupby(place)["seconds"].transform("min"))
+    known = _over_fastest(valid[valid["as_good"]])
+    known = known[known.groupby(_PLACE)["label"].transform("nunique") > 1]
     for target in targets:
         own = known[known["target"] == target]
         name = f"seconds-at-equal-angles-{slug(target)}"

@@ -62,11 +62,16 @@ class Point(NamedTuple):
 
 
 def through(
-    name: str, points: Sequence[Point], kind: Kind, look: SeriesStyle = PLAIN
+    name: str,
+    points: Sequence[Point],
+    kind: Kind,
+    look: SeriesStyle = PLAIN,
+    *,
+    named: bool = True,
 ) -> PlotSeries:
     """Return a series of points with their tooltips."""
     x, y = [p.x for p in points], [p.y for p in points]
-    return PlotSeries(name, x, y, kind, look, [p.words for p in points])
+    return PlotSeries(name, x, y, kind, look, [p.words for p in points], named)
 
 
 @dataclass(frozen=True)
@@ -264,7 +269,7 @@ def _draw_panel(axes: Axes, panel: PlotPanel) -> None:
             if series.kind in ("points", "both"):
                 style |= {"marker": look.marker[0], "markersize": 4.5}
             elif series.kind == "cloud":
-                style |= {"marker": look.marker[0], "markersize": 3, "alpha": 0.3, "mew": 0}
+                style |= {"marker": look.marker[0], "markersize": 3.5, "alpha": 0.5, "mew": 0}
             elif series.kind == "mean":
                 style |= {"marker": look.marker[0], "markersize": 9, "mec": "white", "zorder": 3}
                 if series.ends:
@@ -455,7 +460,7 @@ def _plotly_trace(series: PlotSeries) -> dict[str, Any]:
         trace["line"]["shape"] = "hv"
     trace["marker"] = {"color": look.colour, "symbol": look.marker[1]}
     if series.kind == "cloud":
-        trace["marker"] |= {"opacity": 0.3, "size": 4}
+        trace["marker"] |= {"opacity": 0.5, "size": 5}
     if series.kind == "mean":
         trace["marker"] |= {"size": 12}
     if series.ends:

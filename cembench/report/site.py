@@ -154,7 +154,9 @@ def about(evidence: Evidence, name: str) -> PublishedRun:
     for record in records:
         rate = evidence.rate(record) if record.outcome.status == "ok" else None
         base = evidence.base(record)
-        if rate is not None and base is not None and base.environment == record.environment:
+        if base is None or base.cell.algorithm != evidence.reference:
+            continue  # another target is another contest
+        if rate is not None and base.environment == record.environment:
             place = f"{record.cell.mesh_hash} {record.cell.solves}"
             ratios.setdefault(record.cell.algorithm, {})[place] = 1 + rate
     return PublishedRun(
@@ -229,7 +231,8 @@ def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:
     from cembench.report.render.html import write_html
 
     ordered = sorted(entrants, key=lambda one: one.name)
-    write_html(leaderboard(ordered, "cembench publish"), draft / "leaderboard")
+    place = draft / "leaderboard"
+    write_html(leaderboard(ordered, "cembench publish", place), place)
 
 
 def _plot(runs: Sequence[PublishedRun], ratios: Mapping[str, list[HeadlineRatio | None]]) -> Plot:

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from cembench.report.document import (
     Column,
+    Figure,
+    Findings,
     Gap,
     Item,
     Origin,
@@ -16,7 +18,6 @@ from cembench.report.document import (
     Report,
     Section,
     Table,
-    Text,
     Value,
     entry,
     words,
@@ -67,8 +68,10 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
     for stage in STAGES:
         if stage not in validation.skipped and (runs / stage / "records").is_dir():
             records |= {record.cell.key: record for record in Store(runs / stage).records()}
-    verdict = Text(f"{validation.title}: {sentence(validation)}.")
-    sections = [Section("verdict", "Verdict", (verdict,)), *stage_sections(validation, records)]
+    sections = stage_sections(validation, records)
+    worst = _worst_map(validation, records, runs, folder)
+    if worst is not None:
+        sections.insert(0, Section("worst", "The map with the largest angle errors", (worst,)))
     if validation.growth:
         plot = write_plot(_growth_plot(validation.growth), folder)
         sections[-1] = replace(sections[-1], items=(*sections[-1].items, plot))
@@ -88,7 +91,36 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
         facts=facts,
         sections=tuple(sections),
         records={key: row(record) for key, record in records.items() if key in used},
+        findings=Findings(((f"{validation.title}: {sentence(validation)}.",),), picture=worst),
     )
+
+
+def _worst_map(
+    validation: Validation, records: Mapping[str, Record], runs: Path, folder: Path
+) -> Figure | None:
+    """Return a picture of the map with the largest angle errors; None if no stage keeps maps."""
+    from cembench.conformal.metrics import caption
+    from cembench.drawing.preview import write_preview
+
+    known = [
+        (error, record)
+        for record in records.values()
+        if record.cell.algorithm == validation.algorithm and record.target != "atlas"
+        if (error := record.outcome.metrics.get("angle_error_mean_deg")) is not None
+    ]
+    for _, record in sorted(known, key=lambda pair: -pair[0]):
+        for stage in STAGES:
+            store = Store(runs / stage)
+            mesh, uv = store.mesh(record.cell), store.uv(record.cell)
+            if mesh is None or uv is None:
+                continue
+            place = PurePosixPath("figures", "worst-map.png")
+            (folder / place).parent.mkdir(exist_ok=True)
+            words = caption(record.outcome.metrics)
+            write_preview(mesh, uv, folder / place, title=record.cell.mesh, caption=words)
+            title = f"{record.cell.mesh} and its image by {validation.title}"
+            return Figure("worst-map", title, (place,), words, alternative=title)
+    return None
 
 
 def stage_sections(validation: Validation, records: Mapping[str, Record]) -> list[Section]:
@@ -103,7 +135,11 @@ def _items(validation: Validation, stage: str, records: Mapping[str, Record]) ->
     for skipped, why in validation.skipped.items():
         if skipped == stage:
             command = "cembench validate PLUGIN.py" if stage in validation.not_asked_for else ""
-            yield Gap(_TITLES[stage], why, command)
+            yield Gap(
+                why[0].upper() + why[1:],
+                "the stages before it must find no fault" if "fault" in why else "add it to see it",
+                command,
+            )
     findings = [finding for finding in validation.findings if finding.stage == stage]
     if findings:
         yield _findings_table(stage, findings)
@@ -126,7 +162,9 @@ def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
             for finding in findings
         ],
         notes=tuple(
-            f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in findings if not f.ok
+            dict.fromkeys(
+                f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in findings if not f.ok
+            )
         ),
     )
 

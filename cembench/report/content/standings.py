@@ -45,6 +45,15 @@ _TARGETS: Mapping[str, tuple[str, str]] = {
 }
 
 
+def title_of(target: str) -> str:
+    """Return what the maps to a target are called.
+
+    >>> title_of("free boundary")
+    'Maps with a free boundary'
+    """
+    return _TARGETS.get(target, ("", target))[1]
+
+
 def as_good(angles: Sequence[float], best: Sequence[float]) -> bool:
     """Whether maps are about as good as the best ones on every surface.
 
@@ -92,7 +101,7 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
     against = {one: _over_families(angles[one] / angles[best], families) for one in others}
     sure = {o for o, speeds in against.items() if speeds.interval and speeds.interval.low > 1}
     speeds = {one: _speeds(evidence, keys[one], keys[good[0]], families) for one in order}
-    start, title = _TARGETS.get(target, (f"{target}, on", target))
+    start, title = _TARGETS.get(target, (f"{target}, on", ""))[0], title_of(target)
     few = len(set(families)) < FEWEST_FAMILIES
     known: dict[str, Any] = {
         **{"target": target, "start": start, "title": title, "policy": policy},
