@@ -117,8 +117,8 @@ def _worst_map(
             place = PurePosixPath("figures", "worst-map.png")
             (folder / place).parent.mkdir(exist_ok=True)
             words = caption(record.outcome.metrics)
-            write_preview(mesh, uv, folder / place, title=record.cell.mesh, caption=words)
-            title = f"{record.cell.mesh} and its image by {validation.title}"
+            write_preview(mesh, uv, folder / place)
+            title = f"{record.cell.mesh} and its image by {validation.title}, its worst map"
             return Figure("worst-map", title, (place,), words, alternative=title)
     return None
 
@@ -135,11 +135,7 @@ def _items(validation: Validation, stage: str, records: Mapping[str, Record]) ->
     for skipped, why in validation.skipped.items():
         if skipped == stage:
             command = "cembench validate PLUGIN.py" if stage in validation.not_asked_for else ""
-            yield Gap(
-                why[0].upper() + why[1:],
-                "the stages before it must find no fault" if "fault" in why else "add it to see it",
-                command,
-            )
+            yield Gap("No figures", why, command)
     findings = [finding for finding in validation.findings if finding.stage == stage]
     if findings:
         yield _findings_table(stage, findings)
