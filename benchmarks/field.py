@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import sys
 import warnings
@@ -24,6 +26,8 @@ LEFT_OUT = ("chinese_lion.mat",)
 FOLDERS = (".", "stress")
 #: The figure whose tables stand on the page of the algorithms.
 FIRST = "mean"
+#: The figure whose tables stand on the page of the field; others are in the file beside it.
+SECOND, FILE = "mu", "docs/field.csv"
 #: The tables of each target: figure and heading; E_C of disks in one gauge.
 TABLES = {
     "disk": {
@@ -62,11 +66,29 @@ def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9)
                 row["maps"][spec.name] = figures(spec, mesh)
                 if results:
                     write_text(results, json.dumps(measured, indent=1))
-    by_page: dict[str, list[Table | str]] = {"docs/algorithms.md": [], "docs/field.md": []}
+    first: list[Table | str] = []
+    second: list[Table | str] = []
+    others = []
     for figure, heading, table in tables(measured, algorithms()):
-        page = "docs/algorithms.md" if figure == FIRST else "docs/field.md"
-        by_page[page] += [heading, table]
-    return [Section(parts, page) for page, parts in by_page.items()]
+        if figure in (FIRST, SECOND):
+            (first if figure == FIRST else second).extend([heading, table])
+        else:
+            others.append((heading.strip("*"), table))
+    file = {FILE: lines_of(others)}
+    return [Section(first, "docs/algorithms.md"), Section(second, "docs/field.md", file)]
+
+
+def lines_of(chosen: list[tuple[str, Table]]) -> str:
+    """Return tables as CSV, a line for each surface and algorithm."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["figure", "surface", "triangles", "algorithm", "value"])
+    for heading, table in chosen:
+        for row in table.rows:
+            names = [name for name in row if name not in ("surface", "triangles") and row[name]]
+            about = [heading, row["surface"], row["triangles"]]
+            writer.writerows([*about, name, row[name]] for name in names)
+    return text.getvalue()
 
 
 def algorithms() -> list[Algorithm]:

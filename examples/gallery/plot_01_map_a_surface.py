@@ -8,11 +8,12 @@ Map a surface to the unit disk, look at it under a checkerboard, and read the fi
 import cembench
 
 # %%
-# A surface is a file, a pair of arrays, or the name of a family that can be made. This one is half
-# an ellipsoid. The algorithm need not be named: the default suits the kind of surface.
+# A surface is a file, a pair of arrays, or the name of a surface that can be made. This one is a
+# generated face, a stand-in for a scan. The default algorithm suits the kind of surface; here it is
+# named, so that the face goes to the disk.
 
-surface = cembench.surface("hemi-ellipsoid", 4_000)
-result = cembench.parameterize(surface)
+surface = cembench.surface("liu-smile-face-stand-in", 6_000)
+result = cembench.parameterize(surface, "direct-cem")
 result
 
 # %%
