@@ -330,7 +330,7 @@ def benchmark(
         Many surfaces: real-disks, real-holes, closed, stress, corpus, ict-faces, ict-faces-holes,
         thingi10k, a folder, or an archive. One round each, unless `rounds` or `precision` is given.
     limit : int, optional
-        Surfaces of each of the `sets`, at most.
+        Maximum number of surfaces per set of `sets`.
     faces : int, optional
         Number of triangles of generated surfaces.
     repair : bool

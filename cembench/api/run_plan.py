@@ -148,8 +148,8 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
     check_submits(where)
     if where.is_open:
         reporter.warn(
-            f"{where.address} asks nobody who they are: whoever reaches it runs programs as the "
-            "users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
+            f"{where.address} does not authenticate clients: anyone who can connect can run code "
+            "as the users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off it."
         )
 
 
@@ -240,7 +240,7 @@ def gather_sets(
         reporter.note(f"{more} more are left out; the report lists them")
     if not surfaces.surfaces:
         raise ParameterError.about(
-            "{given} gives no surface that the chosen algorithms take; "
+            "no surface in {given} is accepted by the chosen algorithms; "
             "{fetch} shows whether files can be fetched.",
             fetch=Advice("`cembench.fetch(group=['disks'])`", "`cembench fetch --group disks`"),
             given=", ".join(sets),

@@ -34,7 +34,7 @@ from cembench.report.render.html import render
 from cembench.results.machines import machine_of, machine_of_record, software_differences
 from cembench.results.records import REFERENCE
 
-#: Is told which run's report is made, how many are done, and how many there are.
+#: Called with the run's name, the number done and the total.
 Progress = Callable[[str, int, int], None]
 
 

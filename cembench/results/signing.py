@@ -2,8 +2,8 @@
 
 A digest shows that a file was not damaged; a signature shows who vouches for all files of a run.
 It is OpenSSH's (``ssh-keygen -Y``, namespace "cembench"), detached, in ``RUN/signature``, over the
-names and SHA-256 of the files, those of a bundle with its metadata: author and licence. Whether
-what the signer measured is true it cannot show.
+names and SHA-256 of the files, those of a bundle with its metadata: author and licence. It does not
+prove that the measurements are true.
 """
 
 from __future__ import annotations
