@@ -80,7 +80,7 @@ def test_a_scheduler_without_certificates_is_warned_of(cli):
         "run", "-a", "lscm", "--cluster", "tcp://127.0.0.1:9", "--surfaces", "flat-disk"
     )
     assert code == 2
-    assert "warning: tcp://127.0.0.1:9 asks nobody who they are" in err
+    assert "warning: tcp://127.0.0.1:9 does not authenticate clients" in err
     assert parse_cluster("tls://host:8786").is_open is False
 
 
