@@ -149,8 +149,8 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
     if where.is_open:
         reporter.warn(
             f"{where.address} does not authenticate clients: anyone who can connect can run code "
-            "as the users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others off "
-            "it."
+            "as the users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others "
+            "off it."
         )
 
 
