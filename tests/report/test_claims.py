@@ -173,7 +173,10 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
 @pytest.mark.parametrize(
     ("changed", "told"),
     [
-        ({"holds": "sekonds < 1"}, "claim 'delaunay': 'sekonds < 1' names 'sekonds'; known are"),
+        (
+            {"holds": "sekonds < 1"},
+            "claim 'delaunay': 'sekonds < 1' names 'sekonds', which is not known",
+        ),
         ({"figures": "{held.real}"}, "claim 'delaunay': .*asks for 'real'; allowed are"),
         ({"figures": "{held"}, r"claim 'delaunay': .* is no expression: f-string: expecting '}'"),
     ],

@@ -126,7 +126,7 @@ def test_braces_that_stand_for_nothing_are_an_error(evidence, tmp_path, text):
     ("expression", "said"),
     [
         ("seconds >", "is no expression"),
-        ("sekonds > 1", "names 'sekonds'; known are the functions count"),
+        ("sekonds > 1", "names 'sekonds', which is not known. Did you mean seconds"),
         ("__import__('os')", "names '__import__'"),
         ("seconds.to_csv('x')", "asks for 'to_csv'; allowed are"),
         ("seconds.__class__", "asks for '__class__'"),

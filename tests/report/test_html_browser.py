@@ -221,7 +221,10 @@ def test_a_number_opens_its_record_and_the_record_has_an_address(page, browser):
     page.click("#times .figure-link")
     record = page.wait(lambda: visible(page.all("#record-shown[open]")))[0]
     assert "Foot · cem" in record.text
-    assert "laplacian 0.01" in record.text
+    assert "seconds of each round\n0.1, 0.2, 0.3 s" in record.text
+    assert "laplacian 0.01" not in record.text
+    page.click("#record-shown summary")
+    assert "laplacian 0.01" in page.one("#record-shown").text
     where = browser.current_url.partition("#")
     assert where[2].startswith("record-")
 

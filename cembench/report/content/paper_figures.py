@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from cembench.report.content.evidence import Evidence, model_surface
@@ -19,36 +19,47 @@ Inspections = Mapping[str, Inspection]
 
 def figures_section(evidence: Evidence, seen: Inspections, folder: Path) -> Section:
     """Return the section with the paper's figures."""
-    gaps: list[Gap] = []
+    lacking: list[tuple[str, str]] = []
     items: list[Item] = []
     for picture in evidence.paper.pictures:
         pictures = _pictures(evidence, seen, picture)
         items += pictures
         if not pictures:
-            gaps.append(_gap(evidence, seen, picture.model, picture.figure))
+            lacking.append((picture.figure, picture.model))
     plots: list[Plot | None] = []
     for name in OF_MODELS:
         plots.append(plot := paper_plot(evidence, name, seen))
-        gaps += _lacking(evidence, name, plot, seen)
+        lacking += _lacking(evidence, name, plot)
     cost = declared_plot(evidence, "cost-by-faces")
     over = [paper_plot(evidence, name, seen) for name in OVER_MODELS]
     items += drawn([*plots, cost, exponents_table(evidence), *over], folder)
-    missing = [*_together(gaps), *exhibit_gaps(evidence)]
+    missing = [*_gaps(evidence, seen, lacking), *exhibit_gaps(evidence)]
     return Section("figures", "Figures of the paper", (*items, *missing))
 
 
-def _together(gaps: Sequence[Gap]) -> list[Gap]:
-    """Return gaps with one for all that the run has no surface for."""
-    absent = [gap for gap in gaps if gap.why.endswith(NO_SURFACE)]
-    rest = [gap for gap in gaps if gap not in absent]
-    if len(absent) < 2:
-        return [*gaps]
-    titles = "; ".join(gap.title for gap in absent)
-    return [*rest, Gap(f"{len(absent)} panels", f"{NO_SURFACE} {titles}")]
+def _gaps(
+    evidence: Evidence, seen: Inspections, lacking: Sequence[tuple[str, str]]
+) -> Iterator[Gap]:
+    """Yield the gaps of figures that lack models, one for all models without a surface."""
+    absent: dict[str, list[str]] = {}
+    for figure, model in lacking:
+        if evidence.surface_for_model(model):
+            yield _gap(evidence, seen, model, figure)
+        else:
+            absent.setdefault(figure, []).append(model)
+    if absent:
+        titles = [f"{figure}: {', '.join(models)}" for figure, models in absent.items()]
+        models = dict.fromkeys(model for group in absent.values() for model in group)
+        why = "no surface of this run is or stands in for these models"
+        yield Gap("; ".join(titles), why, _command(evidence, list(models)))
 
 
-#: Why a figure lacks a model.
-NO_SURFACE = "no surface of this run is or stands in for"
+def _command(evidence: Evidence, models: Sequence[str]) -> str:
+    surfaces = ",".join(map(model_surface, models))
+    folder = evidence.store.folder
+    return f"cembench run --surfaces {surfaces} -a {evidence.reference} -o {folder}"
+
+
 #: Plots of a paper with a panel for each of some models, and of one with all of them.
 OF_MODELS = ("energy-by-iteration", "angle-histograms")
 OVER_MODELS = ("energy-over-models", "angles-over-models")
@@ -60,30 +71,24 @@ def paper_plot(evidence: Evidence, name: str, seen: Inspections) -> Plot | None:
     return declared_plot(evidence, name, declared, seen=seen) if declared else None
 
 
-def _lacking(evidence: Evidence, name: str, plot: Plot | None, seen: Inspections) -> list[Gap]:
-    """Return a gap for each model that should have a panel and has none."""
+def _lacking(evidence: Evidence, name: str, plot: Plot | None) -> list[tuple[str, str]]:
+    """Return the figure and each model that should have a panel and has none."""
     declared = own_plots(evidence).get(name)
     there = {panel.of for panel in plot.panels} if plot else set()
-    models = declared.models if declared else ()
-    figure = declared.figure if declared else ""
-    return [_gap(evidence, seen, model, figure) for model in models if model not in there]
+    models, figure = (declared.models, declared.figure) if declared else ((), "")
+    return [(figure, model) for model in models if model not in there]
 
 
 def _gap(evidence: Evidence, seen: Inspections, model: str, figure: str) -> Gap:
-    """Return the gap for a model without a map by CEM in the run, or without the map itself."""
+    """Return the gap for a surface without a map by the reference, or without the map itself."""
     surface = evidence.surface_for_model(model)
     series = evidence.series_of(evidence.reference)
     record = evidence.find(surface, series) if surface and series else None
     title = f"{figure}: {model}"
     if surface and record and record.outcome.status == "ok" and not seen[surface.mesh_hash].kept:
         return Gap(title, seen[surface.mesh_hash].missing_reason)
-    why = evidence.missing_reason(record) if surface else NO_SURFACE
-    return Gap(
-        title,
-        f"no map of {model} by {evidence.reference_label}: {why}",
-        f"cembench run --surfaces {model_surface(model)} -a {evidence.reference} "
-        f"-o {evidence.store.folder}",
-    )
+    why = f"no map of {model} by {evidence.reference_label}: {evidence.missing_reason(record)}."
+    return Gap(title, why, _command(evidence, [model]))
 
 
 def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> list[Figure]:
