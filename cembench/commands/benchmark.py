@@ -73,7 +73,7 @@ def run(
 def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
     from cembench.report.content.evidence import Evidence
     from cembench.report.content.many_surfaces import MANY
-    from cembench.report.run_tables import machine_lines, many_table, results_table, speedups_table
+    from cembench.report.run_tables import contest_tables, machine_lines, many_table, results_table
     from cembench.results.columns import rows
     from cembench.results.records import REFERENCE
     from cembench.results.stability import outlier_lines
@@ -91,8 +91,7 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
             out.print(words)
     else:
         out.print(results_table(evidence))
-        speedups = speedups_table(records, reference)
-        if speedups is not None:
+        for speedups in contest_tables(records, reference):
             out.print("", speedups, sep="\n")
         for words in suspects:
             out.print(words)

@@ -24,7 +24,7 @@ from cembench.results.frame import listed
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.multiple_testing import corrected
-from cembench.results.records import DEFAULT_ROUNDS, Cell, Record
+from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Cell, Record
 from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate
 
@@ -102,6 +102,18 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         ],
         notes=tuple(_corrected_words([comparison for _, comparison in compared])),
     )
+
+
+def contest_tables(records: Sequence[Record], reference: str) -> list[Table]:
+    """Return :func:`speedups_table`, and one for each other target with several algorithms."""
+    tables = [speedups_table(records, reference)]
+    of_reference = {r.target for r in records if r.cell.algorithm == reference}
+    for target in dict.fromkeys(r.target for r in records if r.target not in of_reference):
+        own = [record for record in records if record.target == target]
+        names = list(dict.fromkeys(record.cell.algorithm for record in own))
+        usual = USUAL_REFERENCES.get(target, "")
+        tables.append(speedups_table(own, usual if usual in names else names[0]))
+    return [table for table in tables if table]
 
 
 def _sure(one: Comparison) -> Value:

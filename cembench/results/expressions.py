@@ -58,9 +58,9 @@ def computed(expression: str, known: Mapping[str, Any]) -> Any:
         raise ParameterError(f"{_shown(expression)} fails on this run: {error}.") from error
 
 
-def names_in(expression: str) -> tuple[str, ...]:
-    """Return the names in an expression; raises as :func:`computed` does."""
-    return _compiled(expression)[1]
+def names_in(expression: str, *, text: bool = False) -> tuple[str, ...]:
+    """Return the names in an expression, or in the braces of a text; raises as `computed` does."""
+    return _compiled(f'f"""{expression} """' if text else expression)[1]
 
 
 @cache

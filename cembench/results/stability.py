@@ -140,13 +140,13 @@ def stability_words(records: Sequence[Record]) -> str:
         times = "once" if most == 1 else f"at most {most} times"
         return f"Each cell was timed {times}, so no intervals are given: {_why(without)}."
     if len(unstable) + len(without) == len(timed):
-        start = (
-            f"No time is stable: {len(unstable)} of {len(timed)} have a 95 % interval wider than "
+        sentence = (
+            f"No time is stable ({len(unstable)} of {len(timed)} have a 95 % interval wider than "
+            f"{UNSTABLE_WIDTH:.0%} of the figure)"
         )
-        sentence = f"{start}{UNSTABLE_WIDTH:.0%} of the figure"
     else:
         sentence = (
-            f"{len(unstable) or 'None'} of {len(timed)} times "
+            f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
             f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "
             f"{UNSTABLE_WIDTH:.0%} of the figure)"
         )

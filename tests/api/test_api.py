@@ -166,6 +166,10 @@ def test_benchmark_gives_tables(disk, tmp_path):
     assert max(map(len, table.to_string().splitlines())) <= 80
     assert {"surface", "angle_error_mean_deg"} <= set(run.table(full=True))
     assert len(run.speedups("harmonic-circle")) == 2
+    known = {
+        row["surface"]: row["verdict"] for _, row in run.speedups("harmonic-circle").iterrows()
+    }
+    assert set(known.values()) == {"too few rounds"}
     assert "<table" in run._repr_html_()
     again = cembench.benchmark([disk], ["lscm"], rounds=1, output=tmp_path / "run")
     assert len(again.records()) == 4

@@ -358,4 +358,4 @@ def test_no_time_is_stable_is_said_so(evidence):
         if r.outcome.rounds
     )
     words = words_of(findings(replace(evidence, records=spread), {}, []))
-    assert any(one.startswith("No time is stable: ") for one in words)
+    assert any(one.startswith("No time is stable (") for one in words)

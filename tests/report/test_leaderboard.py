@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from cembench.report.document import Table, items_of
 from cembench.report.leaderboard import Entrant, leaderboard
+from tests.report.conftest import drawing_little
 
 
 def test_an_algorithm_with_other_parameters_has_a_row_of_its_own(evidence):
@@ -33,3 +34,29 @@ def test_algorithms_of_one_title_are_told_apart(evidence):
     tables = {table.name: table for table in items_of(leaderboard(runs, ""), Table)}
     labels = [row[0].text for row in tables["success-by-family"].rows]
     assert {"FDM (fdm)", "FDM (mine)"} <= set(labels)
+
+
+def test_it_opens_with_a_ranked_table_for_each_target_and_a_plot(evidence, tmp_path):
+    def freed(record):
+        cell = record.cell.model_copy(update={"algorithm": "mine"})
+        return record.model_copy(update={"cell": cell, "title": "Mine"})
+
+    mine = tuple(freed(r) for r in evidence.records if r.cell.algorithm == "lscm")
+    both = replace(evidence, records=(*evidence.records, *mine))
+    with drawing_little():
+        report = leaderboard([Entrant("a", both)], "", tmp_path)
+    disk, free = report.findings.tables
+    assert (disk.name, free.name) == ("ranked-disk", "ranked-free-boundary")
+    assert {row[0].text for row in free.rows} == {"LSCM", "Mine"}
+    assert not {"LSCM", "Mine"} & {row[0].text for row in disk.rows}
+    means = [row[1].number for row in disk.rows]
+    assert means == sorted(means)
+    assert all(row[1].record for row in disk.rows)
+    assert report.findings.plot.name == "leaders"
+    assert (tmp_path / report.findings.plot.files[0]).is_file()
+    assert "Maps with a free boundary: LSCM has the smallest" in report.findings.sentences[0][0]
+    seconds = {table.name for table in items_of(report, Table) if table.name.startswith("sec")}
+    assert seconds == {
+        "seconds-at-equal-angles-disk",
+        "seconds-at-equal-angles-free-boundary",
+    }

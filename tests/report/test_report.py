@@ -376,3 +376,14 @@ def test_the_head_says_until_when_it_was_measured(evidence):
     ]
     told = dict(facts(replace(evidence, records=tuple(records))))["rounds"]
     assert "until ±5 % or ±10 % or the time limit was reached" in told
+
+
+def test_a_report_is_two_lines_in_a_notebook(written):
+    report, folder = written
+    assert repr(report).splitlines() == [
+        f"{report.title}: {len(report.records)} records",
+        str(report.page),
+    ]
+    assert report.page.name == "index.html"
+    assert f"<a href='{report.page}'>" in report._repr_html_()
+    assert folder.is_dir()

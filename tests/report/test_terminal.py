@@ -1,5 +1,5 @@
 from cembench.report.content.evidence import Evidence
-from cembench.report.run_tables import results_table, speedups_table
+from cembench.report.run_tables import contest_tables, results_table, speedups_table
 from cembench.results.records import Neighbours
 from cembench.results.store import Store
 from tests.records import changed, record_of
@@ -58,3 +58,15 @@ def test_a_busy_machine_is_told_once(tmp_path):
     text = results_of(changed(record, {"neighbours": beside}))
     assert "busy during 2 of 6 processes" in text
     assert "busy" not in results_of(record)
+
+
+def test_algorithms_with_a_free_boundary_are_compared_with_each_other_too():
+    free = [
+        changed(record_of([s] * 6, algorithm=name), target="free boundary")
+        for name, s in (("lscm", 2.0), ("mine", 1.0))
+    ]
+    disk = changed(record_of([1.0] * 6, algorithm="cem"), target="disk")
+    both, own = map(printed, contest_tables([disk, *free], "cem"))
+    assert "Speedup of cem over the others" in both
+    assert "Speedup of lscm over the others" in own
+    assert "faster" in own

@@ -37,6 +37,7 @@ def test_unstable_times_are_counted_with_what_ended_them():
 )
 def test_what_ended_other_cells_is_said_too(record, why):
     assert stability_words([record]).endswith(f"of the figure): {why}.")
+    assert stability_words([record]).startswith("No time is stable (1 of 1 have")
 
 
 def test_without_any_interval_nothing_is_called_stable():

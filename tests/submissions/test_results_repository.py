@@ -405,6 +405,7 @@ def test_surfaces_of_unknown_licence_are_not_sent(tmp_path, name):
         with zipfile.ZipFile(path) as archive:
             assert len([n for n in archive.namelist() if n.startswith("meshes/")]) == 2 + sent
         assert result.maps == 10 + 5 * sent
+        assert result.unlicensed == (() if sent else (name,))
 
 
 def test_what_cannot_be_submitted_is_said(bundles, tmp_path):
@@ -456,3 +457,20 @@ def test_a_signed_bundle_names_its_signer_and_another_is_refused(bundles, tmp_pa
         err.split()
     )
     assert tempfile.gettempdir() not in err.replace(str(signers), "")
+
+
+def test_maps_that_are_left_out_are_named_with_what_to_add(tmp_path, cli):
+    run = machine_run(tmp_path / "run", 1, mesh="my-face")
+    code, out, err = cli("submit", run.folder, "-o", tmp_path / "mine.zip", "--maps")
+    assert code == 0
+    assert "with maps" in out
+    assert "no licence is stated for my-face" in err
+    assert "--surfaces-licence" in err
+
+
+def test_a_folder_that_is_named_as_a_cell_is_not_looked_for_in_another_run(tmp_path, cli):
+    run = machine_run(tmp_path / "run", 1)
+    code, _, err = cli("show", run.folder)
+    assert code == 2
+    assert f"cembench show CELL --run {run.folder}" in " ".join(err.split())
+    assert "results/run" not in err

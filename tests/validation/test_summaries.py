@@ -43,6 +43,16 @@ def test_junit_has_checks_skipped_stages_and_requirements(tmp_path):
     ]
 
 
+def test_checks_of_one_name_on_two_surfaces_are_two_cases(tmp_path):
+    both = [FAULT.model_copy(update={"surface": name}) for name in ("cap", "cone")]
+    write_junit(validation(*both), tmp_path / "j.xml")
+    cases = Xml.parse(tmp_path / "j.xml").getroot().findall(".//testcase")
+    assert [case.get("name") for case in cases] == [
+        "returns a map on cap",
+        "returns a map on cone",
+    ]
+
+
 def test_another_s_file_is_not_replaced(tmp_path):
     path = tmp_path / "j.xml"
     path.write_text("<testsuites name='mine'/>")

@@ -2,7 +2,7 @@ import pytest
 
 from cembench.validation.document import validation_text
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed, sides
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 from tests.terminal import printed
 
@@ -138,3 +138,22 @@ def test_a_requirement_that_is_not_met_is_told():
     assert sentence(one) == "valid; folds on 1 surface: hand; required and not met: no-folds"
     assert one.valid
     assert not one.passed
+
+
+def test_a_map_that_does_not_converge_is_called_not_conformal_with_what_to_declare():
+    slow = finding("E_C under refinement", "on cap 0.1, 0.09: order 0.71", False)
+    slow = slow.model_copy(update={"surface": "cap", "orders": (0.71, 1.5)})
+    assert sentence(validation(findings=(slow, slow))) == (
+        "invalid: not conformal. Its E_C does not vanish under refinement (order 0.71 on cap; a "
+        "conformal map has 1.5 or more). If that is intended, declare conformal=False"
+    )
+
+
+def test_angle_errors_that_are_rounding_count_as_equal():
+    pair = Pair(
+        surface="sheet", faces=100, energy=0.0, baseline_energy=0.0,
+        angle=4e-13, baseline_angle=2e-13, seconds=1.0, baseline_seconds=1.0,
+        seconds_ratio=1.0, speed="undecided", records=("a", "b"),
+    )  # fmt: skip
+    assert pair.angle_ratio == 1
+    assert sides([pair.angle_ratio]).equal == 1

@@ -81,7 +81,7 @@ def _claim(
     columns = {*COLUMNS, *FRAME_COLUMNS, *OF_CLAIMS}
     more = {*KNOWN, *paper.numbers, *functions, *claim.each, *claim.per}
     expressions = {"rows": claim.rows, **claim.each, "of": claim.of, "lacking": claim.lacking}
-    expressions |= {"holds": claim.holds, "over": claim.over or "1"}
+    expressions |= {"holds": claim.holds}
     texts = {"figures": claim.figures, "none": claim.none, "further": claim.further}
     for field, expression in (*expressions.items(), *texts.items()):
         try:
