@@ -62,6 +62,7 @@ html_title = "cembench"
 html_static_path = ["_static", "preview.png"]
 html_extra_path = ["_pages"]  # of papers, made when the site is built
 html_css_files = ["site.css"]
+html_search_scorer = "_static/scorer.js"
 smartquotes = False  # they would make one dash of the two of an option
 html_copy_source = False
 html_show_sourcelink = False

@@ -1,0 +1,12 @@
+/* Search: guides come before the pages of functions and modules, whose names repeat a word. */
+var Scorer = {
+  score: ([page, , , , score]) => (/^(api|_modules)\//.test(page) ? score - 20 : score),
+  objNameMatch: 11,
+  objPartialMatch: 6,
+  objPrio: { 0: 15, 1: 5, 2: -5 },
+  objPrioDefault: 0,
+  title: 15,
+  partialTitle: 7,
+  term: 5,
+  partialTerm: 2,
+};
