@@ -192,7 +192,7 @@ def standings(contest: Mapping[str, Any]) -> Table:
     columns = [
         Column("algorithm", numeric=False),
         *(Column("valid maps"), Column("mean angle error", unit="°", form=".2f")),
-        *(Column(f"error over {contest['best']}'s"), Column("smallest on")),
+        *(Column(f"error over {contest['best']}'s"), Column("smallest on", detail=True)),
         *(
             Column(f"within {contest['within']} % on", detail=True),
             Column(f"time over {good[0]}'s"),
