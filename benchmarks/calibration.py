@@ -27,7 +27,7 @@ BY_LDM = ("Statue of Liberty", "Isis Statue", "Bimba Statue")
 #: Steps of the levers that weigh alike, and their bounds.
 STEP = {"jag": 0.15, "smooth": 1.0, "even": 0.3, "gain": 0.3, "non_delaunay": 0.05}
 BOUND = {
-    "jag": (0, 1),
+    "jag": (0, 1.5),
     "smooth": (0.05, 40),
     "even": (0, 2),
     "gain": (0, 4),

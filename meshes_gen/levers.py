@@ -38,7 +38,7 @@ M = TypeVar("M", bound=TriangleMesh)
 C = TypeVar("C", bound=Callable[..., TriangleMesh])
 
 Seed = Annotated[int, Field(ge=0)]
-Jag = Annotated[float, Field(ge=0, le=1)]
+Jag = Annotated[float, Field(ge=0, le=1.5)]
 Smooth = Annotated[float, Field(ge=0, le=40)]
 Even = Annotated[float, Field(ge=0, le=2)]
 Gain = Annotated[float, Field(ge=0, le=4)]

@@ -10,7 +10,8 @@ from cembench.core.names import did_you_mean
 from cembench.registry import Registry
 from cembench.report.content.evidence import FRAME_COLUMNS
 from cembench.results.columns import COLUMNS
-from cembench.results.frame import FUNCTIONS, names_in, unknown
+from cembench.results.expressions import names_in
+from cembench.results.frame import FUNCTIONS, unknown
 from cembench.results.papers import Paper, StatedClaim
 
 #: Names that claims know besides those of the paper.
