@@ -122,8 +122,8 @@ def test_a_name_that_no_option_can_choose_is_refused(plugin, name):
 
 
 def test_an_unknown_name_lists_the_known_ones():
-    with pytest.raises(RegistryError, match=r"unknown algorithm 'x'; known: .*cem"):
-        load_registry().algorithm("x")
+    with pytest.raises(RegistryError, match=r"unknown algorithm 'qqq'; known: .*cem"):
+        load_registry().algorithm("qqq")
     with pytest.raises(RegistryError, match=r"Did you mean flat-disk\?"):
         load_registry().surface("flat-dsik")
     with pytest.raises(RegistryError, match="Its stand-in is left-hand-stand-in") as public:
@@ -131,8 +131,8 @@ def test_an_unknown_name_lists_the_known_ones():
     assert "`cembench.load_surface('left-hand')`" in str(public.value)
     public.value.reword({})
     assert "`--dataset left-hand`" in str(public.value)
-    with pytest.raises(RegistryError, match=r"unknown surface 'x'; known: .*flat-disk"):
-        load_registry().surface("x")
+    with pytest.raises(RegistryError, match=r"unknown surface 'qqq'; known: .*flat-disk"):
+        load_registry().surface("qqq")
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cembench.api.notebook import NotebookProgress, html_table, is_notebook
+from cembench.api.notebook import html_table, is_notebook
 from cembench.api.settings import (
     AnyPath,
     Backend,
@@ -542,8 +542,11 @@ def benchmark(
                 reporter.note(f"{mesh.name}: {notice}")
     seconds = inf if rounds else options.budget or inf
     with reporter.watching(len(tasks), seconds, on_cluster=cluster is not None) as shown:
-        line = NotebookProgress(len(tasks)) if reporter is SILENT and is_notebook() else None
-        records = plan.measure(watcher or shown or line, same_environment=same_environment)
+        if reporter is SILENT and watcher is None and is_notebook():
+            from cembench.api.notebook_progress import NotebookProgress
+
+            watcher = NotebookProgress(len(tasks))
+        records = plan.measure(watcher or shown, same_environment=same_environment)
     return Run(folder, tuple(records), plan)
 
 

@@ -184,7 +184,7 @@ def _option_of(
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if choices and not argument.many:
         more |= {"parser": partial(one_of, choices)}
-        more["metavar"] = more["metavar"] or f"[{'|'.join(choices)}]"
+        more["metavar"] = more["metavar"] or "|".join(choices)
         kind = str
     if kind in (int, float) and argument.range is not None:
         least, most = argument.range.least, argument.range.most

@@ -157,7 +157,7 @@ def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder,
     ("given", "words"),
     [
         (["--limit", "3", "--surfaces", "flat-disk"], "--limit needs --set"),
-        (["--set", "EMPTY"], "no surface in EMPTY is accepted"),
+        (["--set", "EMPTY"], "is accepted by the chosen algorithms"),
         (["--set", "EMPTY", "--repair"], "--repair works with single files"),
         (["--set", "nowhere"], "there is no set 'nowhere'"),
     ],

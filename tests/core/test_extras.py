@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 import cembench
-from cembench.api.benchmark import Run
 from cembench.core.extras import MODULES, Extra, MissingExtra, command, missing, require
 from cembench.report.export import Format, export_rows
 
@@ -72,14 +71,6 @@ def fetching(folder):
     fetch(Dataset("a", "A", "http://127.0.0.1:9/a.obj", "0" * 64, "MIT"))
 
 
-def a_report(folder):
-    Run(folder).report()
-
-
-def a_validation(folder):
-    cembench.validate("lscm", output=folder)
-
-
 def parquet(folder):
     export_rows([{"a": 1}], folder / "a.parquet", Format.parquet)
 
@@ -98,8 +89,6 @@ def a_film(folder):
     ("use", "module", "extra"),
     [
         (fetching, "requests", Extra.FETCH),
-        (a_report, "plotly", Extra.REPORT),
-        (a_validation, "plotly", Extra.REPORT),
         (parquet, "pyarrow", Extra.PARQUET),
         (a_stand_in, "skimage", Extra.STANDINS),
         (a_film, "imageio_ffmpeg", Extra.VIDEO),
@@ -117,12 +106,14 @@ def test_each_use_names_its_extra_and_leaves_nothing(use, module, extra, tmp_pat
 def test_the_command_line_says_it_before_it_measures(capsys, monkeypatch, tmp_path):
     from cembench.commands.cli import main
 
-    block(monkeypatch, "plotly")
-    monkeypatch.setattr(sys, "argv", ["cembench", "reproduce", "-o", str(tmp_path / "run")])
+    block(monkeypatch, "skimage")
+    monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
+    words = ("run", "--surfaces", "cowboy-hat-stand-in", "--faces", "600", "-a", "lscm")
+    monkeypatch.setattr(sys, "argv", ["cembench", *words, "-o", str(tmp_path / "run")])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    assert "cembench[report]" in capsys.readouterr().err
+    assert "cembench[standins]" in capsys.readouterr().err
     assert not (tmp_path / "run").exists()
 
 

@@ -132,7 +132,12 @@ def test_cembench_s_own_paper_is_installed_and_the_usual_one():
             "heading =",
             "tables.toml: printed.1: 'heading' is not known here; allowed are title, cap",
         ),
-        ("seconds.csv", "0.5,0.25", "fast,0.25", "tables.1.Foot.lscm: input should be a valid num"),
+        (
+            "seconds.csv",
+            "0.5,0.25",
+            "fast,0.25",
+            "seconds.csv: line 2, column 'lscm': 'fast' is not",
+        ),
         ("seconds.csv", "0.5,0.25", "0.25", "seconds.csv: line 2: 3 cells, under 4 headings"),
         ("seconds.csv", "Hand", "Foot", "seconds.csv: line 3: the model 'Foot' occurs twice"),
         ("seconds.csv", "faces", "triangles", "no table has the column 'faces' for 'Foot'"),

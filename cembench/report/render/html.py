@@ -431,7 +431,10 @@ def _record(key: str, row: Mapping[str, Any]) -> Mapping[str, Any]:
 
 METRIC_TITLES = {metric.name: metric.title for metric in METRICS}
 #: What a record opens with: the columns, in this order, before the metrics.
-_FIRST = ("mesh", "vertices", "faces", "title", "target", "status", "cause", "seconds_raw")
+_FIRST = (
+    *("run", "machine", "mesh", "vertices", "faces", "title", "target", "status", "cause"),
+    "seconds_raw",
+)
 
 
 def _head(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
@@ -439,14 +442,15 @@ def _head(row: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     headings = {"seconds_raw": "seconds of each round", "mesh": "surface", "title": "algorithm"}
     names = [name for name in (*_FIRST, *(m.name for m in METRICS), "iterations") if name in row]
     for name in names:
-        column, value = COLUMNS[name], row[name]
-        heading = headings.get(name) or METRIC_TITLES.get(name) or column.heading or name
+        column, value = COLUMNS.get(name), row[name]
+        usual = column.heading if column else ""
+        heading = headings.get(name) or METRIC_TITLES.get(name) or usual or name
         if isinstance(value, list | tuple):
             text = ", ".join(f"{v:.4g}" for v in value if isinstance(v, int | float))
         else:
             text = f"{value:.4g}" if isinstance(value, float) else str(value)
             text = f"{value:,}" if type(value) is int else text
-        unit = "s" if name == "seconds_raw" else column.unit
+        unit = "s" if name == "seconds_raw" else column.unit if column else ""
         yield heading, f"{text} {unit}".rstrip()
 
 
