@@ -51,7 +51,7 @@ def cut(
     from cembench.api.repair import repair
     from cembench.core.notices import NoticeKind
     from cembench.core.overwriting import refuse_inputs, refuse_present
-    from cembench.mesh.cut import write_seam
+    from cembench.mesh.cut import write_numbers
     from cembench.mesh.files import check_writable_format, write_mesh
 
     check_writable_format(output, with_uv=False)
@@ -68,7 +68,7 @@ def cut(
         repaired = repair(mesh) if mend else None
         disk = call(repaired.mesh if repaired else mesh, through=between or ())
     write_mesh(output, disk.mesh)
-    write_seam(seam, disk)
+    write_numbers(seam, "vertex", disk.origin)
     if as_json:
         about = {
             "input": str(mesh),

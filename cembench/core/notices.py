@@ -20,6 +20,8 @@ class NoticeKind(StrEnum):
     POLYGONS_CUT = "polygons_cut"
     #: Two arrays of a file were used as vertices and triangles, because they fit.
     ARRAYS_GUESSED = "arrays_guessed"
+    #: Vertices in no triangle were left out.
+    ISOLATED_LEFT_OUT = "isolated_left_out"
     #: The mesh was repaired on request.
     REPAIRED = "repaired"
     CUT_OPEN = "cut_open"

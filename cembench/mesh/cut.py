@@ -116,10 +116,10 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
     return Cut(disk, origin, edges, net.length(graph))
 
 
-def write_seam(path: Path, cut: Cut) -> None:
-    """Write a CSV file with the surface vertex of each disk vertex, counted from 0."""
-    rows = "".join(f"{k},{v}\n" for k, v in enumerate(cut.origin.tolist()))
-    content = f"vertex,original\n{rows}".encode()
+def write_numbers(path: Path, what: str, original: Indices) -> None:
+    """Write a CSV file with the original of each vertex or triangle, counted from 0."""
+    rows = "".join(f"{k},{v}\n" for k, v in enumerate(original.tolist()))
+    content = f"{what},original\n{rows}".encode()
     write_bytes(path, content, error=MeshError, parents=False)
 
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -23,7 +24,7 @@ from cembench.core.extras import Extra
 from cembench.core.loading import TooLargeError
 from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.defects import array_of, check_finite, located
+from cembench.mesh.defects import array_of, check_finite, located, representatives
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
 from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
@@ -61,6 +62,8 @@ _WRITERS: dict[str, Callable[[Soup], bytes]] = {
 _OF_TEXTURES: dict[str, Callable[..., bytes]] = {".ply": ply.write, ".glb": gltf.write}
 #: Formats that hold texture coordinates.
 WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
+#: Those whose texture coordinates are read, of which one for each vertex needs copies of vertices.
+_WITH_UV_OF_VERTICES = (".obj", ".off", ".ply")
 #: Those that hold texture coordinates in single precision.
 SINGLE = (".ply", ".glb")
 _SPECIAL_FILES = (
@@ -241,16 +244,44 @@ def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]
         Nothing is left of its mesh.
 
     """
-    try:
-        repaired = repair(soup.V, soup.corners, soup.sizes)
-    except MeshError as error:
-        raise located(error, path) from None
+    repaired = repair_soup(soup, path)
     notices = soup.notices + repaired.notices
     return Soup.of_triangles(*repaired.surfaces[0], name=soup.name, notices=notices), repaired
 
 
+def repair_soup(soup: Soup, path: Path | None = None, **options: Any) -> Repaired:
+    """Repair the content of a file, as :func:`cembench.mesh.repair.repair` does.
+
+    Whether coincident vertices are copies is known where the surface was cut by us, and where an
+    OBJ, OFF or PLY file has a texture coordinate for each vertex.
+    """
+    copies = False if any(n.kind is NoticeKind.CUT_OPEN for n in soup.notices) else None
+    if path is not None and copies is None and path.suffix.lower() in _WITH_UV_OF_VERTICES:
+        with suppress(MeshError):  # of texture coordinates, which a repair can do without
+            copies = _has_uv_of_vertices(read_soup(path, uv=True)) or None
+    try:
+        return repair(soup.V, soup.corners, soup.sizes, copies=copies, **options)
+    except MeshError as error:
+        raise located(error, path) from None
+
+
+def _has_uv_of_vertices(soup: Soup) -> bool:
+    """Whether vertices at one position have different texture coordinates, one each."""
+    if (
+        soup.uv is None
+        or len(soup.uv) != len(soup.V)
+        or (soup.uv_triangles != soup.triangles).any()
+    ):
+        return False
+    first = representatives(soup.V)
+    return bool((np.abs(soup.uv - soup.uv[first]) > 0).any())
+
+
 def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
     """Cut the polygons of a file into triangles and check them as a surface of this class.
+
+    Vertices in no polygon of a file are left out, with a notice; arrays must not have any, since
+    their rows would get other numbers.
 
     Raises
     ------
@@ -258,6 +289,8 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
         A check fails.
 
     """
+    if path is not None:
+        soup, _ = soup.without_isolated()
     polygons = int((soup.sizes > 3).sum())
     notices = soup.notices
     if polygons:

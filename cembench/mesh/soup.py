@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
-from cembench.core.notices import Notice
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.polygons import triangulate
 
 Points = NDArray[np.float64]
@@ -147,6 +147,19 @@ class Soup:
         corners = self.corners[ends[first] - self.sizes[first] : ends[last]]
         used, corners = np.unique(corners, return_inverse=True)
         return replace(self, V=self.V[used], corners=corners, sizes=self.sizes[first : last + 1])
+
+    def without_isolated(self) -> tuple[Self, Indices]:
+        """Return the soup without vertices in no polygon, and the numbers of the others."""
+        used, corners = np.unique(self.corners, return_inverse=True)
+        if len(used) == len(self.V):
+            return self, used
+        first = int(np.setdiff1d(np.arange(len(self.V)), used)[0])
+        text = (
+            f"{len(self.V) - len(used):,} vertices in no triangle were left out, the first being "
+            f"{first} (counted from 0)"
+        )
+        notices = (*self.notices, Notice(NoticeKind.ISOLATED_LEFT_OUT, text))
+        return replace(self, V=self.V[used], corners=corners.reshape(-1), notices=notices), used
 
     @property
     def triangles(self) -> Indices:

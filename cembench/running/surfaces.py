@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 
 from cembench.core.errors import MeshError
 from cembench.core.names import did_you_mean
+from cembench.core.notices import NoticeKind, of_kind
 from cembench.core.wording import Advice
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.datasets import is_fetched, surface_file
@@ -168,7 +169,8 @@ def soup_of(surface: Any) -> Soup:
 
     """
     if isinstance(surface, TriangleMesh):
-        return Soup.of_triangles(surface.V, surface.F, name=surface.name)
+        notices = of_kind(NoticeKind.CUT_OPEN, surface.notices)
+        return Soup.of_triangles(surface.V, surface.F, name=surface.name, notices=notices)
     points = getattr(surface, "vertices", getattr(surface, "points", None))
     if hasattr(surface, "faces") and points is not None:
         faces = np.asarray(surface.faces)
