@@ -75,7 +75,7 @@ def unrolled(mesh: DiskMesh) -> Parameterization:
     lengths = np.roll(side_lengths(mesh.V, mesh.F), 1, axis=1)  # side c starts at corner c
     turn = np.exp(1j * np.deg2rad(corner_angles(mesh.V, mesh.F)))
     uv = np.zeros(mesh.n, dtype=np.complex128)
-    first, second, third = mesh.F[0]
+    _, second, third = mesh.F[0]
     uv[second] = lengths[0, 0]
     uv[third] = lengths[0, 2] * turn[0, 0]
     waiting = [(0, int(h)) for h in twin[0] if h >= 0]

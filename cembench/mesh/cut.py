@@ -109,6 +109,11 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
             "Name two vertices that lie farther apart."
         )
     F, origin = net.cut(graph)
+    copies = np.arange(mesh.n, len(origin))
+    if (origin[copies] == np.arange(len(copies))).all():
+        # In this order they could be the last row of a closed grid, which a repair welds.
+        number = np.concatenate([np.arange(mesh.n), copies[::-1]])
+        F, origin = number[F], origin[number]
     message = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
     notices = mesh.notices + ((Notice(NoticeKind.CUT_OPEN, message),) if graph else ())
     disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=notices)

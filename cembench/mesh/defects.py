@@ -152,7 +152,8 @@ def _remedies(
     """Yield the calls and commands that make a surface usable, in the order of their use."""
     needed = {p.remedy for p in problems}
     several = "cembench.list_algorithms()", "cembench list algorithms"
-    python, shell = "surface" if path is None else repr(str(path)), _named(path, "repaired")
+    python = "surface" if path is None else repr(str(path))
+    shell = _named(path, "repaired_1" if "components" in options else "repaired")
     if Remedy.rescale in needed:
         text = "Angles do not depend on the scale: divide all coordinates by the same number."
         yield Advice(text, text)
@@ -191,7 +192,7 @@ def _remedies(
 _LOSSES = {
     "components": "keeps every piece, each as a surface",
     "weld": "welds what lies apart by less than that",
-    "drop": "keeps the largest piece and drops the rest",
+    "drop": "drops what cannot be kept",
 }
 
 

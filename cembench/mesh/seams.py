@@ -11,7 +11,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.mesh.defects import representatives
+from cembench.mesh.defects import LARGEST_LENGTH, representatives
 from cembench.mesh.gluing import edges_of_half_edges
 
 Points = NDArray[np.float64]
@@ -34,9 +34,10 @@ def coincident_vertices(V: Points, F: Indices) -> Indices:
     """Return the first vertex at the position of each, (n,); on the boundary up to rounding."""
     first = representatives(V)
     rim = boundary_vertices(F)
-    if not len(rim):
+    largest = float(np.abs(V[rim]).max(initial=0.0))
+    if not 0 < largest <= LARGEST_LENGTH:
         return first
-    near = rim[representatives(V[rim], _ROUNDING * float(np.abs(V[rim]).max()))]
+    near = rim[representatives(V[rim], _ROUNDING * largest)]
     if (near == first[rim]).all():
         return first
     i, j = np.arange(len(V)), first
@@ -61,8 +62,9 @@ def are_copies(F: Indices, first: Indices) -> bool:
     -------
     bool
         True where vertices at one position are joined by an edge or have one triangle each, as at
-        the pole of a grid; and where copies follow their originals at few regular distances, as on
-        the sides of a grid. A cut numbers its copies in the order of its curve.
+        the pole of a grid; where copies follow their originals at few regular distances, as on the
+        sides of a grid; and where the last vertices are copies of the first, as of its first row. A
+        cut adds its copies at the end, in the order of its curve.
 
     """
     at = first[F]
@@ -73,6 +75,8 @@ def are_copies(F: Indices, first: Indices) -> bool:
     if ((counts >= 3) & (lone == counts)).any():
         return True
     copies = np.flatnonzero(first != np.arange(len(first)))
+    if copies[-1] - copies[0] == len(copies) - 1 and copies[-1] == len(first) - 1:
+        return len(copies) >= 3 and (first[copies] == np.arange(len(copies))).all()
     steps = len(np.unique(copies - first[copies]))
     return steps <= 3 and len(copies) >= max(3, 2 * steps)
 

@@ -10,7 +10,7 @@ import pytest
 import cembench
 from cembench.core import errors, extras
 from cembench.core.notices import NoticeKind
-from cembench.mesh.defects import Defect, UnusableMeshError
+from cembench.mesh.defects import Defect, RepairLossError, UnusableMeshError
 from cembench.mesh.uvs import OtherSurfaceError
 from cembench.results.records import FaultKind
 from cembench.running.external.exchange import ProgramFault
@@ -19,7 +19,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 CLASSES = {
     *(name for name, value in vars(errors).items() if isinstance(value, type)),
     *(one.__name__ for one in (extras.MissingExtra, ProgramFault)),
-    *(one.__name__ for one in (OtherSurfaceError, UnusableMeshError)),
+    *(one.__name__ for one in (OtherSurfaceError, RepairLossError, UnusableMeshError)),
 }
 
 

@@ -32,7 +32,6 @@ FILES = {
     "inf.obj": (obj(np.where(V == 3, np.inf, V), F), "NaN or infinite"),
     "range.obj": (obj(V, np.where(F == 5, 77, F)), "vertex index out of range"),
     "zero.obj": (obj(V, F).replace("f 1 ", "f 0 "), "vertex index out of range"),
-    "isolated.obj": (obj(np.vstack([V, [[9, 9, 9]]]), F), "isolated vertices.*: 30"),
     "degenerate.obj": (obj(np.where(V == [[0, 0, 0]], V[1], V), F), "degenerate triangles"),
     "edge.obj": (obj(*gallery.three_triangles_on_an_edge()), "non-manifold edge"),
     "vertex.obj": (obj(*gallery.bow_tie()), "non-manifold vertex 0"),

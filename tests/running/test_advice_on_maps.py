@@ -39,7 +39,7 @@ def tube(n=12):
     ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
     i, j = np.arange(n), (np.arange(n) + 1) % n
     F = np.concatenate([np.stack([i, j, j + n], 1), np.stack([i, j + n, i + n], 1)])
-    return np.vstack([ring, ring + [0, 0, 2]]), F
+    return np.vstack([ring, ring + np.array([0, 0, 2])]), F
 
 
 @pytest.mark.parametrize("name", OURS)
