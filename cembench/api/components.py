@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -14,6 +14,7 @@ from cembench.conformal.laplacian import double_areas
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
 from cembench.mesh.files import read_soup
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.registry import Algorithm, Registry
@@ -127,6 +128,8 @@ def read_shells(
     kinds, name = kinds_of(algorithms), str(path)
     generated = is_generated(name, registry)
     soup = soup_of(generate_surface(registry, name)) if generated else read_soup(path)
+    if not (generated or mend):
+        soup = replace(soup, notices=soup.notices + implausible(soup.V, soup.triangles))
     if mend:
         return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
     try:

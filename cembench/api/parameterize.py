@@ -22,6 +22,7 @@ from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
 from cembench.mesh.files import check_writable_format
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
@@ -462,10 +463,11 @@ def parameterize(
     names = algorithms_named(named[0] if named else None)
     candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
+    full = check == "full"
+    mesh = mesh.noted(implausible(mesh.V, mesh.F)) if full else mesh
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     arguments = distribute_parameters([chosen], parameters)[chosen.name]
     cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))
-    full = check == "full"
     if overlay:
         refinement_of(chosen)
         outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)

@@ -81,6 +81,14 @@ def are_copies(F: Indices, first: Indices) -> bool:
     return steps <= 3 and len(copies) >= max(3, 2 * steps)
 
 
+def shortest_at_vertices(n: int, edges: Indices, lengths: Points) -> Points:
+    """Return the length of the shortest edge at each vertex that is not 0; infinite for none."""
+    shortest = np.full(n, np.inf)
+    for k in (0, 1):
+        np.minimum.at(shortest, edges[:, k], np.where(lengths > 0, lengths, np.inf))
+    return shortest
+
+
 def tolerances_of_gaps(V: Points, F: Indices, most: int = 4) -> list[float]:
     """Return powers of ten that may close the gaps between boundary vertices, the smallest first.
 
@@ -90,15 +98,11 @@ def tolerances_of_gaps(V: Points, F: Indices, most: int = 4) -> list[float]:
     from scipy.spatial import cKDTree
 
     edges, _, faces = edges_of_half_edges(F)
-    rim = edges[faces == 1]
-    vertices, ends = np.unique(rim, return_inverse=True)
+    vertices = np.unique(edges[faces == 1])
     if len(vertices) < 2:
         return []
-    ends = ends.reshape(-1, 2)
-    lengths = np.linalg.norm(V[rim[:, 0]] - V[rim[:, 1]], axis=1)
-    shortest = np.full(len(vertices), np.inf)
-    for k in (0, 1):
-        np.minimum.at(shortest, ends[:, k], np.where(lengths > 0, lengths, np.inf))
+    lengths = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1)
+    shortest = shortest_at_vertices(len(V), edges, lengths)[vertices]
     away, _ = cKDTree(V[vertices]).query(V[vertices], k=2)
     gaps = away[:, 1]
     near = np.isfinite(gaps) & (gaps > 0) & (gaps < _GAP * shortest)

@@ -142,6 +142,14 @@ class TriangleMesh:
         """Return the same mesh under another name."""
         return self.trusted(self.V, self.F, printable(name), self.notices)
 
+    def noted(self, notices: tuple[Notice, ...]) -> Self:
+        """Return the same mesh with more notices."""
+        if not notices:
+            return self
+        mesh = self.trusted(self.V, self.F, self.name, (*self.notices, *notices))
+        mesh.__dict__["loops"] = self.loops
+        return mesh
+
     def moved(self, V: ArrayLike) -> Self:
         """Return the same triangles with other vertex positions, finite and real (n, 3)."""
         V, _ = as_arrays(V, self.F)
