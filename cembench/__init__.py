@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from cembench.api.repair import Repair, repair
     from cembench.api.reproduce import Reproduction, reproduce
     from cembench.api.submissions import check_submissions, submit
+    from cembench.api.terrain import terrain
     from cembench.api.validate import validate
     from cembench.core.errors import (
         AlgorithmFailed,
@@ -91,6 +92,7 @@ _PLACES = {
     "cembench.api.reproduce": ("Reproduction", "reproduce"),
     "cembench.api.submissions": ("check_submissions", "submit"),
     "cembench.results.bundle": ("Submission",),
+    "cembench.api.terrain": ("terrain",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
@@ -140,6 +142,7 @@ __all__ = [
     "submit",
     "surface",
     "surface_family",
+    "terrain",
     "validate",
     "write_mesh",
 ]

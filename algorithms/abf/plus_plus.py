@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from cembench.conformal.free_boundary import unrolled
+from cembench.conformal.free_boundary import is_strip, unrolled
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -48,7 +48,7 @@ def abf_plus_plus(
     `wheel_residual`) and the last step changed no angle by more than 1e-4 of itself, and fails
     after `max_iterations`. Folds inside are repaired as in LSCM (`fold_repairs`).
     """
-    if not len(mesh.interior):
+    if is_strip(mesh):
         return unrolled(mesh)
     problem = Angles(mesh)
     wanted = problem.wanted

@@ -18,13 +18,13 @@ from cembench.mesh.plausibility import implausible
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.registry import Algorithm, Registry
+from cembench.running.foreign_meshes import soup_of
 from cembench.running.surfaces import (
     SurfaceFile,
     generate_surface,
     is_generated,
     kinds_of,
     prepared,
-    soup_of,
 )
 
 Ints = NDArray[np.int64]
@@ -131,7 +131,9 @@ def read_shells(
     if not (generated or mend):
         soup = replace(soup, notices=soup.notices + implausible(soup.V, soup.triangles))
     if mend:
-        return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
+        mended = prepared(soup, kinds, path, repair=True, cut=cut)
+        mesh = mended.mesh.noted(implausible(mended.mesh.V, mended.mesh.F, sheets=False))
+        return _alone(replace(mended, mesh=mesh))
     try:
         return _alone(prepared(soup, kinds, path, cut=cut), None if generated else soup)
     except UnusableMeshError as error:
@@ -164,7 +166,8 @@ def read_shells(
                 f"{len(held)} triangles (the following numbers count within this surface)"
             )
             if isinstance(error, UnusableMeshError):
-                raise UnusableMeshError(error.problems, error.path, where) from None
+                more = error.options, error.notices
+                raise UnusableMeshError(error.problems, error.path, where, *more) from None
             raise MeshError(f"{where}: {error}") from None
         vertices.append(own)
         faces.append(held)

@@ -143,9 +143,10 @@ class Result:
         ----------
         path : path
             OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB gets a checkerboard texture.
-        uv : {"unit", "disk"}
+        uv : {"unit", "square", "world", "disk"}
             Whether the map is moved into the unit square, where engines look for textures
-            (``(z + 1 + 1j) / 2`` for a disk), or written as it is.
+            (``(z + 1 + 1j) / 2`` for a disk), fills it as a map of the disk can, has the surface's
+            own units (equal total area), or is written as it is.
         checker : bool
             Whether an OBJ or PLY file gets a checkerboard texture too, as separate files.
         overwrite : bool
@@ -162,7 +163,7 @@ class Result:
             The format is unknown, the folder does not exist, or the file exists and must not be
             replaced. No partial file is left.
         ParameterError
-            `uv` is neither "unit" nor "disk".
+            `uv` is unknown, or "square" for a map that is no disk.
 
         """
         from cembench.api.write_maps import FileOptions, beside, save_map
@@ -174,6 +175,15 @@ class Result:
         for notice in save_map(path, self.mesh, self.z, file_options):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
+
+    def flat(self) -> TriangleMesh:
+        """Return the flattened mesh in the plane z = 0, in the surface's own units.
+
+        Its vertices and triangles have the surface's numbers, and it has the surface's area.
+        """
+        from cembench.api.write_maps import flattened
+
+        return flattened(self.mesh, self.z)
 
     def certificate(self) -> Certificate | HolesCertificate:
         """Enclose the conformal modulus of the surface, which the map should have.

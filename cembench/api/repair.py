@@ -142,7 +142,8 @@ def repair(
     from cembench.mesh.files import read_soup, repair_soup
     from cembench.mesh.soup import Soup
     from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-    from cembench.running.surfaces import prepared, soup_of
+    from cembench.running.foreign_meshes import soup_of
+    from cembench.running.surfaces import prepared
 
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
     soup = soup_of(surface) if path is None else read_soup(path)

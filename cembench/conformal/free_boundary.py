@@ -65,6 +65,11 @@ def pinned_map(L: scipy.sparse.csc_array, loops: Sequence[Indices], pins: Indice
     return x[:n] + 1j * x[n:]
 
 
+def is_strip(mesh: DiskMesh | HoledMesh) -> bool:
+    """Whether a mesh is a disk without interior vertices, whose triangles form a tree."""
+    return len(mesh.loops) == 1 and not len(mesh.interior)
+
+
 def unrolled(mesh: DiskMesh) -> Parameterization:
     """Return the exact map of a disk without interior vertices, which is flat, scaled to area pi.
 

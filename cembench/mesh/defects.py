@@ -100,7 +100,7 @@ class UnusableMeshError(MeshError):
     """A surface with defects: `problems` lists them all, and the message names the remedies.
 
     `path` is the surface's file, `where` a surface in it, `options` those of a repair that keeps
-    the whole surface.
+    the whole surface, `notices` on what else cannot be right.
     """
 
     def __init__(
@@ -109,8 +109,9 @@ class UnusableMeshError(MeshError):
         path: Path | None = None,
         where: str = "",
         options: Mapping[str, float | str] | None = None,
+        notices: tuple[Notice, ...] = (),
     ) -> None:
-        self.problems = tuple(problems)
+        self.problems, self.notices = tuple(problems), notices
         self.path, self.where, self.options = path, where, dict(options or {})
         super().__init__(self._said(lambda one: one.in_python()))
 
@@ -118,6 +119,7 @@ class UnusableMeshError(MeshError):
         """Return the problems, and what to do."""
         where = "".join(f"{place}: " for place in (self.path, self.where) if place)
         remedies = " ".join(map(word, _remedies(self.problems, self.path, self.options)))
+        remedies += "".join(f"\nNote: {notice}." for notice in self.notices)
         if len(self.problems) == 1:
             return f"{where}{self.problems[0].text}. {remedies}"
         lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(self.problems, start=1))
@@ -128,7 +130,8 @@ class UnusableMeshError(MeshError):
         self.args = (self._said(lambda one: one.in_shell(options)),)
 
     def __reduce__(self) -> tuple[type[UnusableMeshError], tuple[Any, ...]]:
-        return UnusableMeshError, (self.problems, self.path, self.where, self.options)
+        more = self.options, self.notices
+        return UnusableMeshError, (self.problems, self.path, self.where, *more)
 
 
 def repair_advice(path: Path | None, options: Mapping[str, object]) -> Advice:
@@ -201,7 +204,8 @@ def located(error: MeshError, path: Path | None) -> MeshError:
     if path is None:
         return error
     if isinstance(error, UnusableMeshError):
-        return UnusableMeshError(error.problems, path, error.where, error.options)
+        more = error.options, error.notices
+        return UnusableMeshError(error.problems, path, error.where, *more)
     if isinstance(error, RepairLossError):
         return RepairLossError(error.kept, error.options, error.better, path)
     return MeshError(f"{path}: {error}")

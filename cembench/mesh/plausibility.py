@@ -26,16 +26,24 @@ _NEAR, _SHARE, _SAMPLE = 1e-3, 0.05, 5_000
 _METRES_PER_DEGREE = 111_320
 
 
-def implausible(V: Points, F: Indices) -> tuple[Notice, ...]:
-    """Return what cannot be right about vertices V (n, 3) and triangles F (m, 3), one line each."""
-    if not (len(F) and np.isfinite(V).all()):
+def implausible(V: Points, F: Indices, *, sheets: bool = True) -> tuple[Notice, ...]:
+    """Return what cannot be right about vertices V (n, 3) and triangles F (m, 3), one line each.
+
+    Without `sheets` only the coordinates are looked at. Triangles with vertices that are missing or
+    not finite are left out.
+    """
+    finite = np.append(np.isfinite(V).all(axis=1), False)
+    F = F[finite[np.where((F >= 0) & (len(V) > F), F, -1)].all(axis=1)]
+    if not len(F):
         return ()
     used, F = np.unique(F, return_inverse=True)
     V, F = V[used], F.reshape(-1, 3)
     edges = edges_of_half_edges(F)[0]
     lengths = np.linalg.norm(V[edges[:, 0]] - V[edges[:, 1]], axis=1)
     # Where the coordinates are wrong, so are distances between sheets.
-    notes = [*_coarse(V, lengths), *_mixed_units(V, F)] or [*_near(V, F, edges, lengths)]
+    notes = [*_coarse(V, lengths), *_mixed_units(V, F)]
+    if not notes and sheets:
+        notes = [*_near(V, F, edges, lengths)]
     return tuple(Notice(kind, text) for kind, text in notes)
 
 

@@ -34,6 +34,7 @@ from cembench.mesh.defects import (
     examine,
     some,
 )
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.repair import repair
 from cembench.mesh.side_lengths import loop_width
 
@@ -98,7 +99,8 @@ class TriangleMesh:
         F, remarks, problems = examine(V, F, connected=kind is not TriangleMesh)
         if problems:
             more, options = _when_repaired(kind, V, F, problems)
-            raise UnusableMeshError([*problems, *more], options=options)
+            wrong = implausible(V, F, sheets=False)
+            raise UnusableMeshError([*problems, *more], options=options, notices=wrong)
         loops = topology.boundary_loops(F, len(V))
         try:
             notices += remarks + kind._check_topology(V, F, loops)

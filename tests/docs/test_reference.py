@@ -80,7 +80,7 @@ def test_the_page_of_the_commands_has_every_verb_and_option(monkeypatch):
         for option in verb.params:
             for flag in option.opts if option.param_type_name == "option" else ():
                 assert f"`{flag}" in sections[name], f"{flag} of {name}"
-    assert "| `--uv unit\\|disk` |" in sections["map"]
+    assert "| `--uv unit\\|square\\|world\\|disk` |" in sections["map"]
     assert "$ cembench map left-hand" in sections["map"]
     assert "Default: `reuse`." in sections["run"]
     assert set(re.findall(r"`cembench ([a-z]+)", page)) <= set(verbs)

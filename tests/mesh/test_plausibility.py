@@ -5,6 +5,7 @@ import pytest
 
 import cembench
 from cembench.core.notices import NoticeKind
+from cembench.mesh.defects import UnusableMeshError
 from cembench.mesh.plausibility import implausible
 from tests import gallery
 
@@ -31,6 +32,13 @@ def test_single_precision_far_from_the_origin(offset):
     assert (
         kinds((100 * V + np.array([offset / 100, 0, 0])).astype(np.float32).astype(float), F) == []
     )
+
+
+def test_a_refusal_names_coordinates_that_are_too_coarse():
+    V, F = hill(60)
+    far = (V + np.array([5e5, 4.5e6, 0])).astype(np.float32).astype(float)
+    with pytest.raises(UnusableMeshError, match="Note: single precision holds coordinates"):
+        cembench.TriangleMesh(far, F)
 
 
 def test_degrees_and_metres():
