@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from cembench.core.errors import CembenchError
 from cembench.core.notices import Notice, NoticeKind
+from cembench.mesh.defects import LARGEST_LENGTH
 from cembench.mesh.gluing import edges_of_half_edges
 from cembench.mesh.repair import repair
 from cembench.mesh.seams import shortest_at_vertices, tolerances_of_gaps
@@ -30,9 +31,9 @@ def implausible(V: Points, F: Indices, *, sheets: bool = True) -> tuple[Notice, 
     """Return what cannot be right about vertices V (n, 3) and triangles F (m, 3), one line each.
 
     Without `sheets` only the coordinates are looked at. Triangles with vertices that are missing or
-    not finite are left out.
+    too large are left out.
     """
-    finite = np.append(np.isfinite(V).all(axis=1), False)
+    finite = np.append((np.abs(V) <= LARGEST_LENGTH).all(axis=1), False)
     F = F[finite[np.where((F >= 0) & (len(V) > F), F, -1)].all(axis=1)]
     if not len(F):
         return ()
