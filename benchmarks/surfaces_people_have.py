@@ -150,6 +150,12 @@ def pieces(count: int, apart: float = 1.0) -> Arrays:
     return all_V, np.vstack([F + k * len(V) for k in range(count)])
 
 
+def bow_tie() -> Arrays:
+    """Return two triangles that touch in one vertex."""
+    V = np.array([[0.0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
+    return V, np.array([[0, 2, 1], [0, 3, 4]])
+
+
 def t_junctions() -> Arrays:
     """Return two flat patches that meet along a line, with 3 and 8 edges there."""
     (u, v, F), (s, t, G) = _grid(4, 3), _grid(4, 8)
@@ -203,8 +209,7 @@ def files() -> Iterator[Case]:
     yield "two pieces 1e-6 apart", ".obj", obj(*pieces(2, 1e-6)), ""
     yield "T-junctions, 3 edges on 8", ".obj", obj(*t_junctions()), "--repair"
     yield "T-junctions, 3 edges on 8", ".obj", obj(*t_junctions()), ""
-    bow = np.array([[0.0, 0, 0], [1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
-    yield "bow-tie", ".obj", obj(bow, np.array([[0, 2, 1], [0, 3, 4]])), "--repair"
+    yield "bow-tie", ".obj", obj(*bow_tie()), "--repair"
     stray = np.vstack([[[9, 9, 9]], V])
     yield "stray vertex", ".obj", obj(stray, F + 1), ""
     yield "strip without interior vertices", ".obj", obj(*strip()), ""

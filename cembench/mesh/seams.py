@@ -20,6 +20,8 @@ Indices = NDArray[np.int64]
 #: Boundary vertices closer than this share of the largest coordinate coincide up to rounding:
 #: sin(2 pi) is not 0.
 _ROUNDING = 2e-15
+#: At the pole of a grid at least so many vertices have one position.
+_POLE = 3
 #: Gaps between boundary vertices are below this share of the edges there.
 _GAP = 0.1
 
@@ -61,18 +63,17 @@ def are_copies(F: Indices, first: Indices) -> bool:
     Returns
     -------
     bool
-        True where vertices at one position are joined by an edge or have one triangle each, as at
-        the pole of a grid; where copies follow their originals at few regular distances, as on the
-        sides of a grid; and where the last vertices are copies of the first, as of its first row. A
-        cut adds its copies at the end, in the order of its curve.
+        True where many vertices at one position or at two are joined by edges or have one triangle
+        each, as at the poles of a grid; where copies follow their originals at few regular
+        distances, as on the sides of a grid; and where the last vertices are copies of the first,
+        as of its first row. A cut adds its copies at the end, in the order of its curve.
 
     """
-    at = first[F]
-    if (at == np.roll(at, 1, axis=1)).any():
-        return True
-    counts = np.bincount(first)
-    lone = np.bincount(first, np.bincount(F.ravel(), minlength=len(first)) == 1)
-    if ((counts >= 3) & (lone == counts)).any():
+    at, counts = first[F], np.bincount(first)
+    joined = np.zeros(len(counts), dtype=bool)
+    joined[at[at == np.roll(at, 1, axis=1)]] = True
+    lone = np.bincount(first, np.bincount(F.ravel(), minlength=len(first)) == 1) == counts
+    if 1 <= np.count_nonzero((joined | lone) & (counts >= _POLE)) <= 2:
         return True
     copies = np.flatnonzero(first != np.arange(len(first)))
     if copies[-1] - copies[0] == len(copies) - 1 and copies[-1] == len(first) - 1:
