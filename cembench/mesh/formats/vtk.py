@@ -37,6 +37,14 @@ _XML = {
     ".vtr": "vtkXMLRectilinearGridReader",
     ".vti": "vtkXMLImageDataReader",
 }
+#: Its readers of legacy files.
+_LEGACY = {
+    "POLYDATA": "vtkPolyDataReader",
+    "STRUCTURED_GRID": "vtkStructuredGridReader",
+    "UNSTRUCTURED_GRID": "vtkUnstructuredGridReader",
+    "STRUCTURED_POINTS": "vtkStructuredPointsReader",
+    "RECTILINEAR_GRID": "vtkRectilinearGridReader",
+}
 #: What other data sets are, and how a surface is made of them in PyVista and ParaView.
 _GRID_OF_VALUES = (
     "a grid of values, not a surface. Extract one: `pyvista.read(file).contour([value])`, or "
@@ -63,11 +71,9 @@ def read(path: Path) -> Soup:
         The file is damaged, or holds no surface.
 
     """
-    with path.open("rb") as file:
-        kind = re.search(rb"\bDATASET\s+(\w+)", file.read(4096))
-    legacy = path.suffix.lower() == ".vtk"
+    kind = _data_set(path)
     refused: MeshError | None = None
-    if find_spec("meshio") and (not legacy or (kind and kind[1] == b"UNSTRUCTURED_GRID")):
+    if find_spec("meshio") and (path.suffix.lower() == ".vtu" or kind == "UNSTRUCTURED_GRID"):
         try:
             return read_by_meshio(path)
         except MeshError as error:
@@ -76,8 +82,14 @@ def read(path: Path) -> Soup:
         return _by_vtk(path)
     if refused is not None:
         raise refused
-    what = kind[1].decode() if kind else "VTK"
-    raise MeshError(f"{what} data are read by vtk, which is not installed: {command(Extra.VTP)}.")
+    raise MeshError(f"{kind} data are read by vtk, which is not installed: {command(Extra.VTP)}.")
+
+
+def _data_set(path: Path) -> str:
+    """Return the kind of data set of a legacy file; "VTK" if none is declared."""
+    with path.open("rb") as file:
+        kind = re.search(rb"\bDATASET\s+(\w+)", file.read(4096))
+    return kind[1].decode() if kind else "VTK"
 
 
 def read_by_meshio(path: Path) -> Soup:
@@ -204,9 +216,9 @@ def _data_of(path: Path) -> Any:
     keep.CallDataType = "string0"  # type: ignore[attr-defined]  # so VTK passes its text
     suffix = path.suffix.lower()
     is_xml = suffix in _XML
-    reader = (
-        getattr(vtkIOXML, _XML[suffix])() if is_xml else vtkIOLegacy.vtkGenericDataObjectReader()
-    )
+    # The generic reader of legacy files hides the errors of those that it calls.
+    legacy = _LEGACY.get(_data_set(path), "vtkGenericDataObjectReader")
+    reader = getattr(vtkIOXML, _XML[suffix])() if is_xml else getattr(vtkIOLegacy, legacy)()
     for event in ("ErrorEvent", "WarningEvent"):
         reader.AddObserver(event, keep)
     reader.SetFileName(str(path))
@@ -228,17 +240,38 @@ def _data_of(path: Path) -> Any:
     return data
 
 
+#: Numbers of a legacy file: points, cells with their corners, and in version 5 these apart.
+_NUMBERS = re.compile(
+    rb"(?m)^(POINTS|POLYGONS|TRIANGLE_STRIPS)[ ]+(\d+)[ ]+(\w+)\s*\n"
+    rb"(?:OFFSETS[ ]+(?:vtktype)?(\w+)\n)?"
+)
+
+
 def _check_counts(path: Path, data: Any) -> None:
-    """Raise if a legacy file declares other numbers of points or cells than were read."""
+    """Raise if a legacy file declares other numbers of points or cells than were read.
+
+    VTK does not notice that a binary file was cut short within its last array.
+    """
     content = path.read_bytes()
-    read = {"POINTS": data.GetNumberOfPoints}
+    read = {b"POINTS": data.GetNumberOfPoints()}
     if data.IsA("vtkPolyData"):
-        read["POLYGONS"], read["TRIANGLE_STRIPS"] = data.GetNumberOfPolys, data.GetNumberOfStrips
-    for word, number in read.items():
-        declared = re.search(rb"(?m)^" + word.encode() + rb"\s+(\d+)\s", content)
-        offsets = word != "POINTS" and b"OFFSETS" in content  # which count one more
-        if declared and int(declared[1]) - offsets != number():
-            raise damaged(f"{int(declared[1]):,} {word} are declared, but {number():,} were found")
+        read |= {b"POLYGONS": data.GetNumberOfPolys(), b"TRIANGLE_STRIPS": data.GetNumberOfStrips()}
+    binary = re.search(rb"(?m)^BINARY\s*$", content[:1024]) is not None
+    for match in _NUMBERS.finditer(content):
+        word, declared, size, offsets = match.groups()
+        number = int(declared) - (offsets is not None)  # which count one more
+        if number != read.get(word, number):
+            raise damaged(f"{number:,} {word.decode()} are declared, but {read[word]:,} were found")
+        end = match.end()
+        if word == b"POINTS":
+            end += 3 * number * (8 if size == b"double" else 4)
+        elif offsets is None:
+            end += 4 * int(size)
+        else:
+            width = 8 if offsets == b"int64" else 4
+            end += int(declared) * width + int(size) * width
+        if binary and end > len(content):
+            raise damaged(f"the {word.decode()} take {end:,} bytes, the file has {len(content):,}")
 
 
 def write_vtp(surface: Soup) -> bytes:

@@ -35,9 +35,9 @@ class Content:
         polygons = [tuple(place[k] for k in polygon) for polygon in self.polygons]
         return Content([self.points[k] for k in numbers], polygons)
 
-    def checked(self) -> Content:
-        """Return this content, or raise where a polygon cannot be one."""
-        polygons = [polygon for polygon in self.polygons if len(polygon) != 2]  # lines
+    def checked(self, *, lines: bool = False) -> Content:
+        """Return this content, or raise where a polygon cannot be one. `lines` may be there."""
+        polygons = [polygon for polygon in self.polygons if len(polygon) != 2 or not lines]
         if polygons and len(polygons) < len(self.polygons):
             return Content(self.points, polygons).checked()
         for number, polygon in enumerate(self.polygons):
