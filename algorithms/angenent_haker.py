@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_iteration import pole_start
-from cembench.conformal.free_boundary import with_area_pi
+from cembench.conformal.free_boundary import is_strip, unrolled, with_area_pi
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -34,6 +34,8 @@ def angenent_haker(
     (15), and the interior is one Dirichlet solve with the same factor. The image is scaled to area
     pi; folds inside are repaired as in LSCM (`fold_repairs`).
     """
+    if is_strip(mesh):
+        return unrolled(mesh)
     L = laplacian(mesh, delaunay=delaunay)
     bordered = BorderedLaplacian(mesh, L, (mesh.boundary,))
     f_b = pole_start(mesh.V, mesh.F, bordered.solved_boundary)

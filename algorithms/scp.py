@@ -12,7 +12,7 @@ from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.curvature import mixed_vertex_areas
-from cembench.conformal.free_boundary import conformal_energy_form, with_area_pi
+from cembench.conformal.free_boundary import conformal_energy_form, is_strip, unrolled, with_area_pi
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
 from cembench.core.clock import phase
@@ -68,6 +68,8 @@ def scp(
     gap to the next eigenvalue (`eigenvalue`, `residual`, `sweeps`). The image is scaled to area pi,
     and folds inside are repaired as in LSCM (`fold_repairs`).
     """
+    if is_strip(mesh):
+        return unrolled(mesh)
     L = laplacian(mesh, delaunay=delaunay)
     b = mesh.boundary
     if weights == "area" or len(b) > LARGEST_DENSE:

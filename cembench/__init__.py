@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from cembench.api.reproduce import reproduce as reproduce
     from cembench.api.submissions import check_submissions as check_submissions
     from cembench.api.submissions import submit as submit
+    from cembench.api.terrain import terrain as terrain
     from cembench.api.validate import validate as validate
     from cembench.core.errors import AlgorithmFailed as AlgorithmFailed
     from cembench.core.errors import CembenchError as CembenchError
@@ -102,6 +103,7 @@ _PLACES = {
     "cembench.api.papers": ("check_paper",),
     "cembench.api.submissions": ("check_submissions", "submit"),
     "cembench.results.bundle": ("Submission",),
+    "cembench.api.terrain": ("terrain",),
     "cembench.api.validate": ("validate",),
 }
 _PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}

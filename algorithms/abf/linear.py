@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from cembench.conformal.free_boundary import is_strip, unrolled
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
@@ -33,6 +34,8 @@ def abf_linear(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     logarithm) are what remains of the constraints, since the step is linear. Folds inside are
     repaired as in LSCM (`fold_repairs`).
     """
+    if is_strip(mesh):
+        return unrolled(mesh)
     problem = Angles(mesh)
     wanted = problem.wanted
     e, _ = problem.step(wanted, wanted**2, np.zeros_like(wanted))

@@ -7,6 +7,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+from cembench.conformal.free_boundary import is_strip, unrolled
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -47,6 +48,8 @@ def abf_plus_plus(
     `wheel_residual`) and the last step changed no angle by more than 1e-4 of itself, and fails
     after `max_iterations`. Folds inside are repaired as in LSCM (`fold_repairs`).
     """
+    if is_strip(mesh):
+        return unrolled(mesh)
     problem = Angles(mesh)
     wanted = problem.wanted
     angles, weight = wanted.copy(), 1 / wanted**2

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from cembench.conformal.boundary_curve import closed_curve
-from cembench.conformal.free_boundary import with_area_pi
+from cembench.conformal.free_boundary import is_strip, unrolled, with_area_pi
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
@@ -53,6 +53,8 @@ def bff_free(
     of the exterior angles from 2 pi. A boundary that crosses itself is left as it is, and the
     harness reports it. Folds inside are repaired as in LSCM (`fold_repairs`).
     """
+    if is_strip(mesh) and not corners:
+        return unrolled(mesh)
     yamabe = YamabeBoundary(mesh, delaunay=delaunay)
     turns, lengths = yamabe.natural, yamabe.lengths
     if corners:

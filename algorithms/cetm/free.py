@@ -10,7 +10,7 @@ from pydantic import Field
 
 from cembench.conformal.boundary_curve import closed_curve
 from cembench.conformal.discrete_metric import angle_sums, length_cross_ratios
-from cembench.conformal.free_boundary import with_area_pi
+from cembench.conformal.free_boundary import is_strip, unrolled, with_area_pi
 from cembench.conformal.harmonic import edge_lengths
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.side_lengths import side_lengths
@@ -48,6 +48,8 @@ def cetm_free(
     one solve in the flat metric, and the image is scaled to area pi. Folds inside are repaired as
     in LSCM (`fold_repairs`), after which cross ratios are no longer kept.
     """
+    if is_strip(mesh):
+        return unrolled(mesh)
     b = mesh.boundary
     lengths = side_lengths(mesh.V, mesh.F)
     flat = np.full(mesh.n, 2 * np.pi)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,24 +13,27 @@ from numpy.typing import NDArray
 from cembench.conformal.laplacian import double_areas
 from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
-from cembench.mesh.defects import Defect, UnusableMeshError
+from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
 from cembench.mesh.files import read_soup
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.soup import Soup
 from cembench.mesh.topology import components
 from cembench.registry import Algorithm, Registry
+from cembench.running.foreign_meshes import soup_of
 from cembench.running.surfaces import (
     SurfaceFile,
     generate_surface,
     is_generated,
     kinds_of,
     prepared,
-    soup_of,
 )
 
 Ints = NDArray[np.int64]
 
-#: Maximum number of surfaces in a file; one with more pieces is a triangle soup that needs welding.
-MOST = 100
+#: Maximum number of surfaces in a file.
+MOST = 1000
+#: A file whose surfaces have fewer triangles on average is a soup that may need welding.
+_FEW = 4
 #: Defects that belong to a single surface; others concern the whole file.
 _OF_SHELLS = {Defect.components, Defect.closed, Defect.holes, Defect.no_hole, Defect.handles}
 
@@ -125,16 +128,29 @@ def read_shells(
     kinds, name = kinds_of(algorithms), str(path)
     generated = is_generated(name, registry)
     soup = soup_of(generate_surface(registry, name)) if generated else read_soup(path)
+    if not (generated or mend):
+        soup = replace(soup, notices=soup.notices + implausible(soup.V, soup.triangles))
     if mend:
-        return _alone(prepared(soup, kinds, path, repair=True, cut=cut))
+        mended = prepared(soup, kinds, path, repair=True, cut=cut)
+        mesh = mended.mesh.noted(implausible(mended.mesh.V, mended.mesh.F, sheets=False))
+        return _alone(replace(mended, mesh=mesh))
     try:
-        return _alone(prepared(soup, kinds, path, cut=cut))
+        return _alone(prepared(soup, kinds, path, cut=cut), None if generated else soup)
     except UnusableMeshError as error:
         if {problem.defect for problem in error.problems} - _OF_SHELLS:
             raise
         pieces = _split(soup)
-        if not 2 <= len(pieces) <= MOST:
+        if len(pieces) < 2 or (
+            len(soup.triangles) < _FEW * len(pieces) and error.options.get("weld")
+        ):
             raise
+        if len(pieces) > MOST:
+            each = repair_advice(path, {"components": "all"})
+            raise MeshError.about(
+                "{path} holds {count:,} surfaces; up to {most:,} of a file are mapped at once. "
+                "{each} writes each to a file of its own.",
+                **{"path": path, "count": len(pieces), "most": MOST, "each": each},
+            ) from None
     F = soup.triangles
     parts, vertices, faces = [], [], []
     for k, (own, held) in enumerate(pieces):
@@ -150,24 +166,32 @@ def read_shells(
                 f"{len(held)} triangles (the following numbers count within this surface)"
             )
             if isinstance(error, UnusableMeshError):
-                raise UnusableMeshError(error.problems, error.path, where) from None
+                more = error.options, error.notices
+                raise UnusableMeshError(error.problems, error.path, where, *more) from None
             raise MeshError(f"{where}: {error}") from None
         vertices.append(own)
         faces.append(held)
     return Shells(path, soup.V, F, tuple(parts), tuple(vertices), tuple(faces))
 
 
-def _alone(file: SurfaceFile) -> Shells:
+def _alone(file: SurfaceFile, soup: Soup | None = None) -> Shells:
+    """Return a file with one surface; a soup may have vertices besides, which are kept."""
     mesh = file.uncut or file.mesh
-    every = (np.arange(mesh.n),), (np.arange(mesh.m),)
-    return Shells(file.path, mesh.V, mesh.F, (file,), *every, as_read=file.repaired is None)
+    V, own = mesh.V, np.arange(mesh.n)
+    if soup is not None and len(soup.V) > mesh.n:
+        V, own = soup.V, np.unique(soup.corners)
+    every = (np.arange(mesh.m),)
+    return Shells(file.path, V, own[mesh.F], (file,), (own,), every, file.repaired is None)
 
 
 def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
-    """Return the vertices and triangles of each surface; empty if a vertex is in no triangle."""
+    """Return the vertices and triangles of each surface."""
     F = soup.triangles
-    count, label = components(F, len(soup.V))
-    of_faces = label[F[:, 0]]
-    if len(np.unique(of_faces)) < count:
-        return []
-    return [(np.flatnonzero(label == k), np.flatnonzero(of_faces == k)) for k in range(count)]
+    label = components(F, len(soup.V))[1]
+    of_faces, of_vertices = label[F[:, 0]], label[np.unique(F)]
+    faces, vertices = np.argsort(of_faces, kind="stable"), np.argsort(of_vertices, kind="stable")
+    parts = [
+        np.split(order, np.cumsum(np.unique(of, return_counts=True)[1])[:-1])
+        for of, order in ((of_vertices, vertices), (of_faces, faces))
+    ]
+    return [(np.unique(F)[own], held) for own, held in zip(*parts, strict=True)]

@@ -47,6 +47,7 @@ def map_files(
     bake: AnyPath | None = None,
     geometry_image: AnyPath | None = None,
     remesh: AnyPath | None = None,
+    flat: AnyPath | None = None,
     side: Annotated[int, Range(4, 8192)] = 129,
     html: AnyPath | None = None,
     preview: bool = False,
@@ -84,8 +85,10 @@ def map_files(
     output : path, optional
         Surface with UVs: OBJ, PLY, GLB, VTP, NPZ. For several surfaces: a folder, or a file with
         all of them.
-    uv : {"unit", "disk"}
-        Move the UVs into the unit square, or keep the map as it is (a disk).
+    uv : {"unit", "square", "world", "disk"}
+        Move the UVs into the unit square, let a map of the disk fill that square (conformally but
+        for the corners), give them the surface's own units (equal total area), or keep the map as
+        it is (a disk).
     equal_parts : bool
         Give several surfaces in one file equal parts of the unit square.
     checker : bool
@@ -96,6 +99,9 @@ def map_files(
         Sample the surface on a grid: NPY, EXR or PNG.
     remesh : path, optional
         Remesh the surface through the map, and write it to this file.
+    flat : path, optional
+        Write the flattened mesh, the image of the map with z = 0, in the surface's own units: OBJ,
+        OFF, PLY, STL, GLB, VTP, NPZ.
     side : int
         Samples along a side, for `geometry_image` and `remesh`.
     html : path, optional
@@ -167,6 +173,7 @@ def map_files(
         check_options,
         check_overlay_options,
         check_shells,
+        check_square,
         check_takes_disks,
         output_files,
         picture_files,
@@ -195,15 +202,16 @@ def map_files(
         meshes = [meshes]
     paths, target = [Path(mesh) for mesh in meshes], path_of(output)
     outputs = output_files(paths, target)
-    named = {"geometry_image": geometry_image, "remeshed": remesh, "html": html}
+    named = {"geometry_image": geometry_image, "remeshed": remesh, "flat": flat, "html": html}
     extras = {what: Path(path) for what, path in named.items() if path is not None}
     file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
     check_options(paths, outputs, file_options)
+    check_square(candidates, uv)
     is_atlas = any(a.target == "atlas" for a in candidates)
     if is_atlas and (file_options.extras.keys() - {"html"} or bake or len(paths) > 1):
         raise ParameterError.about(
-            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh} "
-            "and {bake}, which need one UV per vertex.",
+            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
+            "{flat} and {bake}, which need one UV per vertex.",
             name=candidates[0].name,
         )
     sources = local_files(paths, registry, reporter)

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
-from cembench.api.write_maps import FileOptions, save_map
+from cembench.api.settings import ON_THE_CIRCLE, Placement
+from cembench.api.write_maps import FileOptions, flattened, save_map
 from cembench.conformal.atlas import laid_out
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
@@ -18,7 +19,7 @@ from cembench.core.names import file_name
 from cembench.core.notices import Notice
 from cembench.core.overwriting import refuse_twice
 from cembench.core.wording import Advice
-from cembench.mesh.files import check_writable_format
+from cembench.mesh.files import check_writable_format, write_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.mesh.unit_square import packed
 from cembench.registry import Algorithm
@@ -36,6 +37,8 @@ def write_extras(
             from cembench.api.geometry_images import write_geometry_image
 
             write_geometry_image(path, mesh, z, options.side)
+        elif what == "flat":
+            write_mesh(path, flattened(mesh, z))
         elif what == "remeshed":
             from cembench.conformal.resample import regular_remesh
 
@@ -70,15 +73,15 @@ def check_options(
         raise ParameterError.about("surfaces in one file share the unit square: leave out {uv}.")
     if options.extras and len(meshes) > 1:
         raise ParameterError.about(
-            "{geometry_image}, {remesh} and {html} take one surface; map them one by one."
+            "{geometry_image}, {remesh}, {flat} and {html} take one surface; map them one by one."
         )
     for what, path in options.extras.items():
         if what == "geometry_image":
             from cembench.api.geometry_images import check_image_format
 
             check_image_format(path)
-        elif what == "remeshed":
-            check_writable_format(path, with_uv=True)
+        elif what in ("remeshed", "flat"):
+            check_writable_format(path, with_uv=what == "remeshed")
         elif path.suffix.lower() not in (".html", ".htm"):
             raise ParameterError.about(
                 "{page}: {html} writes a web page; use the suffix .html.", page=path
@@ -96,7 +99,8 @@ def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
     holds = {"path": path, "surfaces": surfaces, "each": each}
     if surfaces > 1 and options.extras:
         raise ParameterError.about(
-            "{path} holds {surfaces} surfaces; {geometry_image}, {remesh} and {html} take one. "
+            "{path} holds {surfaces} surfaces; {geometry_image}, {remesh}, {flat} and {html} take "
+            "one. "
             "{each} gives each alone.",
             **holds,
         )
@@ -104,6 +108,18 @@ def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
         raise ParameterError.about(
             "{path} holds {surfaces} surfaces, which share the unit square: leave out {uv}.",
             **holds,
+        )
+
+
+def check_square(candidates: Sequence[Algorithm], place: Placement) -> None:
+    """Raise :class:`ParameterError` if a map that is no disk should fill the square."""
+    other = next((a for a in candidates if a.target not in ON_THE_CIRCLE), None)
+    if place == "square" and other is not None:
+        raise ParameterError.about(
+            "{uv:'square'} needs a map onto the disk, and {name} maps to another target "
+            "({target}): take {algorithm:'direct-cem'}.",
+            name=other.name,
+            target=other.target,
         )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from cembench.api.components import Shells
 from cembench.api.map_outputs import draw_maps, write_extras
-from cembench.api.write_maps import FileOptions, write_shells, write_together
+from cembench.api.write_maps import FileOptions, world_scale, write_shells, write_together
 from cembench.conformal.atlas import laid_out
 from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
@@ -65,6 +65,8 @@ class Mapped:
     certificate: str = ""
     #: What the refined mesh is that the map is on, if that was asked for.
     overlay: str = ""
+    #: The factor from the map to the surface's own units, where these are written.
+    uv_scale: float | None = None
 
     @property
     def ok(self) -> bool:
@@ -197,7 +199,10 @@ class Maps:
                 notices = write_extras(self.file_options, *shown, record)
             noticed = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
-        return replace(mapped, written=written, notices=noticed)
+        scale = None
+        if record.target != "atlas" and (self.file_options.place == "world" or "flat" in extras):
+            scale = world_scale(uv, mesh, mesh.F)
+        return replace(mapped, written=written, notices=noticed, uv_scale=scale)
 
 
 def _overlay(fine: TriangleMesh, coarse: TriangleMesh) -> str:

@@ -22,6 +22,7 @@ from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
 from cembench.mesh.files import check_writable_format
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
@@ -142,9 +143,10 @@ class Result:
         ----------
         path : path
             OBJ, PLY, GLB, VTP or NPZ, by its suffix. GLB gets a checkerboard texture.
-        uv : {"unit", "disk"}
+        uv : {"unit", "square", "world", "disk"}
             Whether the map is moved into the unit square, where engines look for textures
-            (``(z + 1 + 1j) / 2`` for a disk), or written as it is.
+            (``(z + 1 + 1j) / 2`` for a disk), fills it as a map of the disk can, has the surface's
+            own units (equal total area), or is written as it is.
         checker : bool
             Whether an OBJ or PLY file gets a checkerboard texture too, as separate files.
         overwrite : bool
@@ -161,7 +163,7 @@ class Result:
             The format is unknown, the folder does not exist, or the file exists and must not be
             replaced. No partial file is left.
         ParameterError
-            `uv` is neither "unit" nor "disk".
+            `uv` is unknown, or "square" for a map that is no disk.
 
         """
         from cembench.api.write_maps import FileOptions, beside, save_map
@@ -173,6 +175,15 @@ class Result:
         for notice in save_map(path, self.mesh, self.z, file_options):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
+
+    def flat(self) -> TriangleMesh:
+        """Return the flattened mesh in the plane z = 0, in the surface's own units.
+
+        Its vertices and triangles have the surface's numbers, and it has the surface's area.
+        """
+        from cembench.api.write_maps import flattened
+
+        return flattened(self.mesh, self.z)
 
     def certificate(self) -> Certificate | HolesCertificate:
         """Enclose the conformal modulus of the surface, which the map should have.
@@ -462,10 +473,11 @@ def parameterize(
     names = algorithms_named(named[0] if named else None)
     candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
+    full = check == "full"
+    mesh = mesh.noted(implausible(mesh.V, mesh.F)) if full else mesh
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     arguments = distribute_parameters([chosen], parameters)[chosen.name]
     cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))
-    full = check == "full"
     if overlay:
         refinement_of(chosen)
         outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)

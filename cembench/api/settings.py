@@ -26,7 +26,9 @@ LONGEST = 10_000_000.0
 MOST_FACES = 1_000_000_000
 
 AnyPath: TypeAlias = str | os.PathLike[str]
-Placement: TypeAlias = Literal["unit", "disk"]
+Placement: TypeAlias = Literal["unit", "square", "world", "disk"]
+#: Targets whose outer boundary is the unit circle, so that the map can be put on a square.
+ON_THE_CIRCLE = ("disk", "circular holes", "disk with holes")
 Solves: TypeAlias = Literal["reuse", "backslash"]
 Backend: TypeAlias = Literal["cvxopt", "cvxopt-metis", "superlu", "pardiso"]
 Threads: TypeAlias = Annotated[int, Range(1, 1024)]

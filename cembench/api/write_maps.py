@@ -11,7 +11,9 @@ import numpy as np
 from cembench.api.components import Shells, areas_of
 from cembench.api.settings import Placement
 from cembench.conformal.atlas import cut_map
-from cembench.conformal.planar import orientations
+from cembench.conformal.laplacian import double_areas
+from cembench.conformal.planar import orientations, signed_areas
+from cembench.conformal.resample import disk_to_square
 from cembench.core.arrays import Complex
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
@@ -19,7 +21,7 @@ from cembench.core.notices import Notice, NoticeKind
 from cembench.core.wording import Advice
 from cembench.mesh.files import SINGLE, write_soup
 from cembench.mesh.formats import gltf, obj
-from cembench.mesh.soup import Soup, Texture, columns
+from cembench.mesh.soup import Indices, Soup, Texture, columns
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed, to_unit_square
 from cembench.mesh.uvs import uv_of_faces
@@ -83,7 +85,8 @@ def save_map(
     Returns a notice if rounding folds triangles in the file.
     """
     options = file_options or FileOptions()
-    soup = Soup.of_triangles(mesh.V, mesh.F, placed(z, options.place), name=mesh.name)
+    uv = placed(z, options.place, mesh, mesh.F)
+    soup = Soup.of_triangles(mesh.V, mesh.F, uv, name=mesh.name)
     return _save(output, [soup], z, options)
 
 
@@ -106,11 +109,12 @@ def write_shells(
     elif atlas:
         mesh = shells.parts[0].mesh
         cut = cut_map(mesh, maps[0].reshape(-1, 3))
-        uv = placed(cut.uv, options.place)
+        uv = placed(cut.uv, options.place, mesh, cut.surface.F)
         soup = Soup.of_triangles(mesh.V, mesh.F, uv, cut.surface.F, name=mesh.name)
         return _save(output, [soup], cut.uv, options)
     else:
-        moved = [placed(maps[0], options.place)]
+        mesh = shells.parts[0].mesh
+        moved = [placed(maps[0], options.place, mesh, mesh.F)]
     uv, corners = shells.joined(moved)
     name = shells.parts[0].mesh.name if len(maps) == 1 else shells.path.stem
     soup = Soup.of_triangles(shells.V, shells.F, uv, corners, name=name)
@@ -134,9 +138,41 @@ def write_together(
     return _save(output, soups, np.concatenate(maps), options)
 
 
-def placed(z: Complex, place: Placement) -> Complex:
-    """Return a map moved to the placement of its texture coordinates."""
-    return to_unit_square(z) if place == "unit" else z
+def placed(z: Complex, place: Placement, surface: TriangleMesh, F: Indices) -> Complex:
+    """Return a map moved to the placement of its texture coordinates.
+
+    Triangles F (m, 3) are those of the surface, by numbers of the map's points.
+
+    Raises
+    ------
+    ParameterError
+        A map that does not reach the unit circle should be put on a square.
+
+    """
+    if place == "unit":
+        return to_unit_square(z)
+    if place == "world":
+        return z * world_scale(z, surface, F)
+    if place == "square":
+        if np.abs(np.abs(z).max() - 1) > 1e-9:
+            raise ParameterError.about(
+                "{uv:'square'} needs a map onto the disk, which then fills the square: take "
+                "{algorithm:'direct-cem'}."
+            )
+        return (disk_to_square(z) + (1 + 1j)) / 2
+    return z
+
+
+def world_scale(z: Complex, surface: TriangleMesh, F: Indices) -> float:
+    """Return the factor that gives a map the surface's total area, so that it has its units."""
+    area = float(np.abs(signed_areas(z, F)).sum())
+    return float(np.sqrt(double_areas(surface.V, surface.F).sum() / 2 / area)) if area else 1.0
+
+
+def flattened(mesh: TriangleMesh, z: Complex) -> TriangleMesh:
+    """Return the image of a map as a mesh in the plane z = 0, in the surface's own units."""
+    flat = z * world_scale(z, mesh, mesh.F)
+    return mesh.trusted(np.column_stack([columns(flat), np.zeros(len(z))]), mesh.F, mesh.name)
 
 
 def _save(
@@ -175,7 +211,7 @@ def _save(
         write_bytes(output, text.encode("latin-1"), error=MeshError, parents=False)
     else:
         write_soup(output, soups[0], image)
-    return _folded_by_rounding(output, maps, _joined(soups))
+    return _folded_in_file(output, maps, _joined(soups), options.place)
 
 
 def _obj_text(soup: Soup, source: Shells | None) -> str:
@@ -224,8 +260,8 @@ def _joined(parts: Sequence[Soup]) -> Soup:
     )
 
 
-def _folded_by_rounding(output: Path, z: Complex, soup: Soup) -> tuple[Notice, ...]:
-    """Return a notice of how many triangles rounding folds in the file."""
+def _folded_in_file(output: Path, z: Complex, soup: Soup, place: Placement) -> tuple[Notice, ...]:
+    """Return a notice of how many triangles fold in the file, though not in the map."""
     single, F = output.suffix.lower() in SINGLE, soup.uv_triangles
     assert soup.uv is not None
     written = soup.uv.astype(np.complex64).astype(np.complex128) if single else soup.uv
@@ -233,6 +269,9 @@ def _folded_by_rounding(output: Path, z: Complex, soup: Soup) -> tuple[Notice, .
     count = int(((orientations(z, F) > 0) & (after <= 0)).sum())
     if not count:
         return ()
+    if place == "square" and not single:
+        text = f"{count} of {len(F)} triangles fold in the square, at its corners"
+        return (Notice(NoticeKind.FOLDED_BY_ROUNDING, text),)
     precision = "single precision" if single else "the unit square"
     remedy = "write OBJ, VTP or NPZ" if single else "UVs in the disk (uv: disk) stay as they are"
     notices = (

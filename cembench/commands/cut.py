@@ -20,7 +20,7 @@ from cembench.core.errors import MeshError
     "cembench cut sphere.ply -o disk.ply --between 0 812  ·  "
     "cembench map torus.obj --cut -o torus_uv.obj"
 )
-@from_api(cut_surface, without=("surface", "through"))
+@from_api(cut_surface, without=("surface", "through", "along"))
 def cut(
     call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
@@ -38,6 +38,14 @@ def cut(
         tuple[int, int] | None,
         typer.Option(metavar="A B", help="Two vertices that the cut must reach, counted from 0."),
     ] = None,
+    along: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE|uv",
+            help="Seams to cut along: a text file with the vertices of a seam on each line, "
+            "counted from 0, or 'uv' for the seams of the mesh file's texture coordinates.",
+        ),
+    ] = None,
     mend: Annotated[
         bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
     ] = False,
@@ -51,7 +59,7 @@ def cut(
     from cembench.api.repair import repair
     from cembench.core.notices import NoticeKind
     from cembench.core.overwriting import refuse_inputs, refuse_present
-    from cembench.mesh.cut import write_seam
+    from cembench.mesh.cut import read_seams, write_numbers
     from cembench.mesh.files import check_writable_format, write_mesh
 
     check_writable_format(output, with_uv=False)
@@ -66,9 +74,11 @@ def cut(
     refuse_present([seam], force=force)
     with err.status("cutting", spinner="line"):
         repaired = repair(mesh) if mend else None
-        disk = call(repaired.mesh if repaired else mesh, through=between or ())
+        seams = along if along in (None, "uv") else read_seams(Path(along))
+        disk = call(repaired.mesh if repaired else mesh, through=between or (), along=seams)
+    rim = sum(map(len, disk.mesh.loops))
     write_mesh(output, disk.mesh)
-    write_seam(seam, disk)
+    write_numbers(seam, "vertex", disk.origin)
     if as_json:
         about = {
             "input": str(mesh),
@@ -78,19 +88,19 @@ def cut(
             "cut_length": disk.length,
             "vertices": disk.mesh.n,
             "faces": disk.mesh.m,
-            "boundary_vertices": len(disk.mesh.boundary),
+            "boundary_vertices": rim,
         }
         steps = {} if repaired is None else {"repair": repaired.steps}
         print_json(about | steps)
         return
     for notice in disk.mesh.notices:
-        if notice.kind is not NoticeKind.CUT_OPEN:  # printed below
+        if along or notice.kind is not NoticeKind.CUT_OPEN:  # printed below
             note(f"{mesh.stem}: {notice}")
     if repaired is not None:
         print_steps(repaired.steps)
     out.print(
         f"{len(disk.edges):,} edges cut, {disk.length:.6g} long; the disk has "
-        f"{disk.mesh.n:,} vertices, {len(disk.mesh.boundary):,} of them on its boundary"
+        f"{disk.mesh.n:,} vertices, {rim:,} of them on its boundary"
     )
     for path in (output, seam):
         out.print(str(path), soft_wrap=True)

@@ -99,7 +99,8 @@ def _more_of(mapped: Mapped) -> dict[str, Any]:
     repaired = mapped.surface.repaired
     proof = {"certificate": mapped.certificate} if mapped.certificate else {}
     refined = {"overlay": mapped.overlay} if mapped.overlay else {}
-    return proof | refined | ({"repair": repaired.counts} if repaired else {})
+    scale = {} if mapped.uv_scale is None else {"uv_scale": mapped.uv_scale}
+    return proof | refined | scale | ({"repair": repaired.counts} if repaired else {})
 
 
 def _show_all(mapped: Mapped, output: bool, *, verbose: bool, keep_invalid: bool) -> None:

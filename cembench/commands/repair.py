@@ -13,6 +13,9 @@ from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, note, out, print_json
 from cembench.commands.from_api import Call, from_api
 
+#: What the tables beside an output number, and the heading of its column.
+_NUMBERED = {"vertices": "vertex", "faces": "triangle"}
+
 
 @app.command(
     epilog="Examples:  cembench repair scan.obj -o mended.obj  ·  "
@@ -35,17 +38,19 @@ def repair(
             "-o",
             "--output",
             help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
-            "file each.",
+            "file each. OUTPUT_vertices.csv and OUTPUT_faces.csv beside it give the number that "
+            "each vertex and triangle had.",
         ),
     ],
     force: Annotated[
         bool,
-        typer.Option("--force", help="Overwrite the input, or existing files OUT_1, OUT_2, ..."),
+        typer.Option("--force", help="Overwrite the input, or existing files OUT_1, ..., *.csv"),
     ] = False,
     as_json: Json = False,
 ) -> None:
     """Write the repaired surfaces, and print what was done."""
     from cembench.core.overwriting import refuse_inputs, refuse_present
+    from cembench.mesh.cut import write_numbers
     from cembench.mesh.files import check_writable_format, write_mesh
     from cembench.mesh.topology import genus
 
@@ -56,10 +61,16 @@ def repair(
     files = [output]
     if len(repaired.meshes) > 1:
         files = [output.with_stem(f"{output.stem}_{k}") for k in range(1, len(repaired.meshes) + 1)]
-        refuse_present(files, force=force)
+    tables = [[file.with_name(f"{file.stem}_{of}.csv") for of in _NUMBERED] for file in files]
+    beside = [table for of_file in tables for table in of_file]
+    refuse_present([*files[len(files) == 1 :], *beside], force=force)
     about: list[dict[str, Any]] = []
-    for path, surface in zip(files, repaired.meshes, strict=True):
+    for path, of_file, old, surface in zip(
+        files, tables, repaired.origins, repaired.meshes, strict=True
+    ):
         write_mesh(path, surface)
+        for table, what, numbers in zip(of_file, _NUMBERED.values(), old, strict=True):
+            write_numbers(table, what, numbers)
         about.append(
             {
                 "vertices": surface.n,
@@ -67,13 +78,16 @@ def repair(
                 "boundary_loops": len(surface.loops),
                 "genus": genus(surface.F, surface.n, surface.loops),
                 "output": str(path),
+                "originals": [str(table) for table in of_file],
             }
         )
     if as_json:
-        print_json({"input": str(mesh), "steps": repaired.steps, "surfaces": about})
+        kept = repaired.kept._asdict()
+        print_json({"input": str(mesh), "kept": kept, "steps": repaired.steps, "surfaces": about})
         return
     for notice in repaired.notices:
         note(f"{mesh.stem}: {notice}")
+    out.print(f"kept: {repaired.kept}")
     print_steps(repaired.steps)
     for one in about:
         out.print(

@@ -19,7 +19,7 @@ from cembench.conformal.laplacian import laplacian
 from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
-from cembench.mesh.cut import Cut, cut_open
+from cembench.mesh.cut import DiskCut, cut_open
 from cembench.mesh.triangle_mesh import HoledMesh
 
 Loop = NDArray[np.int64]
@@ -33,7 +33,7 @@ class ConjugateFunctions:
     ----------
     u, v : float (n, k)
         The functions, and the conjugates: v with `jump` added on the cut surface.
-    cut : Cut
+    cut : DiskCut
         The surface cut open along curves that join all boundaries.
     boundary : int64 (b,)
         The boundary of the cut surface, from the start of a piece of the outer boundary.
@@ -49,7 +49,7 @@ class ConjugateFunctions:
 
     u: Real
     v: Real
-    cut: Cut
+    cut: DiskCut
     boundary: Loop
     jump: Real
     extension: HarmonicExtension
@@ -105,7 +105,7 @@ def conjugate_functions(mesh: HoledMesh, outer: Loop, holes: Sequence[Loop]) -> 
     return ConjugateFunctions(u, v, cut, boundary, jump, extension, *energies)
 
 
-def _jumps(cut: Cut, outer: Loop, holes: Sequence[Loop]) -> tuple[Loop, Real]:
+def _jumps(cut: DiskCut, outer: Loop, holes: Sequence[Loop]) -> tuple[Loop, Real]:
     """Return the boundary of a cut surface, and functions on the cut surface (n', k).
 
     Function i is constant along each bank and each boundary but for two steps: up by 1 on an edge

@@ -10,10 +10,14 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.metrics import corner_angles
 from cembench.conformal.planar import polygon_area
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
+from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.gluing import twins_of_half_edges
+from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 
 Complex = NDArray[np.complex128]
@@ -59,6 +63,36 @@ def pinned_map(L: scipy.sparse.csc_array, loops: Sequence[Indices], pins: Indice
         Q_ff, Q_fp = rows[:, free], rows[:, fixed]
     x[free] = Cholesky(Q_ff).solve(-(Q_fp @ x[fixed]))
     return x[:n] + 1j * x[n:]
+
+
+def is_strip(mesh: DiskMesh | HoledMesh) -> bool:
+    """Whether a mesh is a disk without interior vertices, whose triangles form a tree."""
+    return len(mesh.loops) == 1 and not len(mesh.interior)
+
+
+def unrolled(mesh: DiskMesh) -> Parameterization:
+    """Return the exact map of a disk without interior vertices, which is flat, scaled to area pi.
+
+    Its triangles form a tree: each is laid out in the plane beside the one before, so that no angle
+    changes. Far triangles may overlap, as in any map with a free boundary.
+    """
+    twin = twins_of_half_edges(mesh.F).reshape(-1, 3)
+    lengths = np.roll(side_lengths(mesh.V, mesh.F), 1, axis=1)  # side c starts at corner c
+    turn = np.exp(1j * np.deg2rad(corner_angles(mesh.V, mesh.F)))
+    uv = np.zeros(mesh.n, dtype=np.complex128)
+    _, second, third = mesh.F[0]
+    uv[second] = lengths[0, 0]
+    uv[third] = lengths[0, 2] * turn[0, 0]
+    waiting = [(0, int(h)) for h in twin[0] if h >= 0]
+    while waiting:
+        before, h = waiting.pop()
+        t, c = divmod(h, 3)
+        i, j, k = mesh.F[t, [c, (c + 1) % 3, (c + 2) % 3]]
+        along = (uv[j] - uv[i]) / abs(uv[j] - uv[i])
+        uv[k] = uv[i] + lengths[t, (c + 2) % 3] * along * turn[t, c]
+        waiting += [(t, int(g)) for g in twin[t] if g >= 0 and g // 3 != before]
+    uv *= np.sqrt(np.pi / polygon_area(uv[mesh.boundary]))
+    return Parameterization(uv, extras={"unrolled": True})
 
 
 def with_area_pi(

@@ -197,6 +197,15 @@ def square_to_disk(w: Complex) -> Complex:
     return np.asarray((1 - 1j) / np.sqrt(2) * value)
 
 
+def disk_to_square(z: Complex) -> Complex:
+    """Map the unit disk conformally to the square with corners (+-1, +-1), as Schwarz did.
+
+    It is the inverse of :func:`square_to_disk`: the integral of 1 / sqrt(1 + z^4), up to a factor.
+    """
+    value = z * special.hyp2f1(0.25, 0.5, 1.25, -(z**4)) / special.hyp2f1(0.25, 0.5, 1.25, -1.0)
+    return np.asarray(value.real.clip(-1, 1) + 1j * value.imag.clip(-1, 1))
+
+
 def _weights(corners: Complex, points: Complex) -> Real:
     """Return the barycentric coordinates of points, clipped to the triangle."""
     a, u, v = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]

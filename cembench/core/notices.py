@@ -20,6 +20,16 @@ class NoticeKind(StrEnum):
     POLYGONS_CUT = "polygons_cut"
     #: Two arrays of a file were used as vertices and triangles, because they fit.
     ARRAYS_GUESSED = "arrays_guessed"
+    #: Vertices in no triangle were left out.
+    ISOLATED_LEFT_OUT = "isolated_left_out"
+    #: The steps of the coordinates are as large as the edges.
+    COARSE_COORDINATES = "coarse_coordinates"
+    #: Positions in degrees, heights in metres.
+    MIXED_UNITS = "mixed_units"
+    #: Two sheets of the surface nearly coincide.
+    NEAR_SHEETS = "near_sheets"
+    #: Boundaries lie a tiny distance apart.
+    GAPS = "gaps"
     #: The mesh was repaired on request.
     REPAIRED = "repaired"
     CUT_OPEN = "cut_open"

@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -49,10 +50,10 @@ _ROOTS = 4
 
 @dataclass(frozen=True)
 class Cut:
-    """A surface cut open into a disk."""
+    """A surface cut open, into a disk unless given seams divide it."""
 
-    #: The disk. Its triangles are those of the surface, in the same order.
-    mesh: DiskMesh
+    #: The disk, or several pieces. Its triangles are those of the surface, in the same order.
+    mesh: TriangleMesh
     #: The vertex of the surface that each vertex of the disk is a copy of. The first n vertices of
     #: the disk are the n vertices of the surface.
     origin: Indices
@@ -61,7 +62,14 @@ class Cut:
     length: float
 
 
-def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
+@dataclass(frozen=True)
+class DiskCut(Cut):
+    """A surface cut open into a disk."""
+
+    mesh: DiskMesh
+
+
+def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> DiskCut:
     """Cut a surface into a disk along short curves.
 
     Parameters
@@ -109,17 +117,126 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> Cut:
             "Name two vertices that lie farther apart."
         )
     F, origin = net.cut(graph)
+    copies = np.arange(mesh.n, len(origin))
+    if (origin[copies] == np.arange(len(copies))).all():
+        # In this order they could be the last row of a closed grid, which a repair welds.
+        number = np.concatenate([np.arange(mesh.n), copies[::-1]])
+        F, origin = number[F], origin[number]
     message = f"cut open along {len(graph):,} edges of length {net.length(graph):.6g}"
     notices = mesh.notices + ((Notice(NoticeKind.CUT_OPEN, message),) if graph else ())
     disk = DiskMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=notices)
     edges = net.edges[np.array(sorted(graph), dtype=np.int64)]
-    return Cut(disk, origin, edges, net.length(graph))
+    return DiskCut(disk, origin, edges, net.length(graph))
 
 
-def write_seam(path: Path, cut: Cut) -> None:
-    """Write a CSV file with the surface vertex of each disk vertex, counted from 0."""
-    rows = "".join(f"{k},{v}\n" for k, v in enumerate(cut.origin.tolist()))
-    content = f"vertex,original\n{rows}".encode()
+def cut_along(mesh: TriangleMesh, edges: Indices) -> Cut:
+    """Cut a surface along given edges (k, 2), and further where one piece is not a disk then.
+
+    Edges that divide the surface make several pieces, which are not cut further.
+
+    Raises
+    ------
+    ParameterError
+        Two vertices are not joined by an edge.
+    UnusableMeshError
+        The surface is not connected.
+
+    """
+    pieces = components(mesh.F, mesh.n)
+    if pieces is not None:
+        raise UnusableMeshError([pieces])
+    net = _Net.of(mesh)
+    low, high = np.sort(np.asarray(edges, dtype=np.int64).reshape(-1, 2), axis=1).T
+    number = np.minimum(net._between(low, high), len(net.edges) - 1)
+    missing = np.flatnonzero((net.edges[number] != np.stack([low, high], axis=1)).any(axis=1))
+    if len(missing):
+        i, j = low[missing[0]], high[missing[0]]
+        raise ParameterError(f"no edge of {mesh.name} joins the vertices {i} and {j}.")
+    graph = sorted({k for k in number.tolist() if not net.rim[k]})
+    F, origin = net.cut(graph)
+    opened = TriangleMesh.from_arrays(mesh.V[origin], F, name=mesh.name, notices=mesh.notices)
+    islands = topology.components(F, opened.n)[0]
+    chosen, length = net.edges[graph], net.length(graph)
+    said = f"cut open along {len(graph):,} given edges of length {length:.6g}"
+    if islands > 1:
+        said += f", into {islands} islands"
+    else:
+        rest = cut_open(opened)
+        if len(rest.edges):
+            said += f", and {len(rest.edges):,} more that a disk needs"
+        chosen = np.concatenate([chosen, origin[rest.edges]])
+        opened, origin, length = rest.mesh, origin[rest.origin], length + rest.length
+    kept = tuple(one for one in opened.notices if one.kind is not NoticeKind.CUT_OPEN)
+    notices = (*kept, Notice(NoticeKind.CUT_OPEN, said))
+    whole = opened.trusted(opened.V, opened.F, opened.name, notices)
+    return Cut(whole, origin, chosen, length)
+
+
+def edges_of_paths(mesh: TriangleMesh, paths: Iterable[Sequence[int]]) -> Indices:
+    """Return the edges (k, 2) of paths through these vertices, the shortest between two of them.
+
+    Raises
+    ------
+    ParameterError
+        A vertex is not in the mesh, or a path has fewer than two.
+
+    """
+    net = _Net.of(mesh)
+    graph = net._distances()
+    edges: list[Edge] = []
+    for path in paths:
+        named = [int(vertex) for vertex in path]
+        wrong = [vertex for vertex in named if not 0 <= vertex < mesh.n]
+        if wrong or len(named) < 2:
+            raise ParameterError(
+                f"a seam goes through {named}; allowed are two or more vertices of {mesh.name}, "
+                f"whole numbers from 0 to {mesh.n - 1}."
+            )
+        for start, end in pairwise(named):
+            _, before = scipy.sparse.csgraph.dijkstra(
+                graph, indices=start, return_predecessors=True
+            )
+            while end != start:
+                edges.append((int(before[end]), end))
+                end = int(before[end])
+    return np.array(edges, dtype=np.int64).reshape(-1, 2)
+
+
+def read_seams(path: Path) -> list[list[int]]:
+    """Read a text file with the vertices of a seam on each line, between spaces or commas.
+
+    Raises
+    ------
+    ParameterError
+        The file cannot be read, or a line holds anything else.
+
+    """
+    try:
+        lines = path.read_text("utf-8").splitlines()
+        rows = [line.partition("#")[0].replace(",", " ").split() for line in lines]
+        return [[int(word) for word in row] for row in rows if row]
+    except (OSError, ValueError):
+        raise ParameterError(
+            f"{path} cannot be read as seams; allowed is a text file with the vertices of a seam "
+            "on each line, whole numbers counted from 0."
+        ) from None
+
+
+def edges_of_uv_seams(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> Indices:
+    """Return the edges (k, 2) at which texture coordinates of the corners (m, 3) differ."""
+    net = _Net.of(mesh)
+    (s, c), (t, d) = (np.divmod(half_edges, 3) for half_edges in net.pairs.T)
+    ends = uv[s, c] - uv[t, (d + 1) % 3], uv[s, (c + 1) % 3] - uv[t, d]
+    slack = 1e-6 * float(np.abs(uv - uv.mean()).max())
+    apart = np.maximum(*map(np.abs, ends)) > slack
+    edges: Indices = net.edges[net.edge[net.pairs[apart, 0]]]
+    return edges
+
+
+def write_numbers(path: Path, what: str, original: Indices) -> None:
+    """Write a CSV file with the original of each vertex or triangle, counted from 0."""
+    rows = "".join(f"{k},{v}\n" for k, v in enumerate(original.tolist()))
+    content = f"{what},original\n{rows}".encode()
     write_bytes(path, content, error=MeshError, parents=False)
 
 

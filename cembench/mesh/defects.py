@@ -7,7 +7,7 @@ mesh, so that a user can repair them in one go.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
+from cembench.core.wording import Advice, Setting
 from cembench.mesh import topology
 from cembench.mesh.gluing import vertices_of_several_fans
 
@@ -86,29 +87,39 @@ class Problem:
     text: str
     #: For holes: number of edges of the largest one that would have to be filled.
     edges: int = 0
+    #: The way to remove it, where that is not the usual one.
+    other_remedy: Remedy | None = None
 
     @property
     def remedy(self) -> Remedy:
         """The way to remove this defect."""
-        return _REMEDIES.get(self.defect, Remedy.repair)
+        return self.other_remedy or _REMEDIES.get(self.defect, Remedy.repair)
 
 
 class UnusableMeshError(MeshError):
     """A surface with defects: `problems` lists them all, and the message names the remedies.
 
-    `path` is the surface's file, `where` a surface in it.
+    `path` is the surface's file, `where` a surface in it, `options` those of a repair that keeps
+    the whole surface, `notices` on what else cannot be right.
     """
 
     def __init__(
-        self, problems: Sequence[Problem], path: Path | None = None, where: str = ""
+        self,
+        problems: Sequence[Problem],
+        path: Path | None = None,
+        where: str = "",
+        options: Mapping[str, float | str] | None = None,
+        notices: tuple[Notice, ...] = (),
     ) -> None:
-        self.problems = tuple(problems)
-        self.path, self.where = path, where
-        super().__init__(self._said(_remedies_in_python(problems, path)))
+        self.problems, self.notices = tuple(problems), notices
+        self.path, self.where, self.options = path, where, dict(options or {})
+        super().__init__(self._said(lambda one: one.in_python()))
 
-    def _said(self, remedies: str) -> str:
+    def _said(self, word: Callable[[Advice], str]) -> str:
         """Return the problems, and what to do."""
         where = "".join(f"{place}: " for place in (self.path, self.where) if place)
+        remedies = " ".join(map(word, _remedies(self.problems, self.path, self.options)))
+        remedies += "".join(f"\nNote: {notice}." for notice in self.notices)
         if len(self.problems) == 1:
             return f"{where}{self.problems[0].text}. {remedies}"
         lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(self.problems, start=1))
@@ -116,67 +127,76 @@ class UnusableMeshError(MeshError):
 
     def reword(self, options: Mapping[str, str]) -> None:
         """Advise commands instead of calls."""
-        self.args = (self._said(_remedies_in_shell(self.problems, self.path)),)
+        self.args = (self._said(lambda one: one.in_shell(options)),)
 
     def __reduce__(self) -> tuple[type[UnusableMeshError], tuple[Any, ...]]:
-        return UnusableMeshError, (self.problems, self.path, self.where)
+        more = self.options, self.notices
+        return UnusableMeshError, (self.problems, self.path, self.where, *more)
 
 
-#: What to do about a scale at which squares of lengths overflow or vanish.
-_RESCALE = "Angles do not depend on the scale: divide all coordinates by the same number."
-
-
-def _remedies_in_python(problems: Sequence[Problem], path: Path | None) -> str:
-    """Return the calls that repair a surface, in the order of their use."""
-    needed = {p.remedy for p in problems}
+def repair_advice(path: Path | None, options: Mapping[str, object]) -> Advice:
+    """Return the call and the command that repair a surface with these options."""
+    call = "".join(f", {name}={value!r}" for name, value in options.items())
     surface = "surface" if path is None else repr(str(path))
-    filled = max(p.edges for p in problems)
-    fill = f", fill_holes={filled}" if Remedy.fill in needed else ""
-    others = "Use an algorithm for {} (see `cembench.list_algorithms()`)."
-    advice = [_RESCALE] if Remedy.rescale in needed else []
-    if Remedy.repair in needed or fill:
-        does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
-        advice.append(f"`cembench.repair({surface}{fill})` {does}; its `mesh` is the new surface.")
-        surface = "mesh"
-    if fill:
-        advice.append(others.format("surfaces with holes where they should stay"))
-    if Remedy.cut in needed:
-        advice.append(
-            f"`cembench.cut({surface})` makes it a disk; `map_files(cut=True)` writes the UVs for "
-            "the uncut surface."
-        )
-    if Remedy.other_algorithm in needed:
-        advice.append(others.format("disks"))
-    return " ".join(advice)
-
-
-def _remedies_in_shell(problems: Sequence[Problem], path: Path | None) -> str:
-    """Return the commands that repair a surface, in the order of their use."""
-    needed = {p.remedy for p in problems}
     source = "IN" if path is None else shlex.quote(str(path))
-    mended = "OUT" if path is None else f"{shlex.quote(path.stem + '_repaired')}.obj"
-    fill = f" --fill-holes {max(p.edges for p in problems)}" if Remedy.fill in needed else ""
-    advice = [_RESCALE] if Remedy.rescale in needed else []
+    settings = [Setting(name, repr(value)).in_shell({}) for name, value in options.items()]
+    command = " ".join(["cembench repair", source, "-o", _named(path, "repaired"), *settings])
+    return Advice(f"`cembench.repair({surface}{call})`", f"`{command}`")
+
+
+def _named(path: Path | None, what: str) -> str:
+    """Return the name of a file that a command writes."""
+    return "OUT" if path is None else f"{shlex.quote(path.stem + '_' + what)}.obj"
+
+
+def _remedies(
+    problems: Sequence[Problem], path: Path | None, options: Mapping[str, object]
+) -> Iterator[Advice]:
+    """Yield the calls and commands that make a surface usable, in the order of their use."""
+    needed = {p.remedy for p in problems}
+    several = "cembench.list_algorithms()", "cembench list algorithms"
+    python = "surface" if path is None else repr(str(path))
+    shell = _named(path, "repaired_1" if "components" in options else "repaired")
+    if Remedy.rescale in needed:
+        text = "Angles do not depend on the scale: divide all coordinates by the same number."
+        yield Advice(text, text)
+    edges = max(p.edges for p in problems)
+    fill = {"fill_holes": edges} if Remedy.fill in needed else {}
     if Remedy.repair in needed or fill:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
         does = "fills the holes" if Remedy.repair not in needed else does
-        only = f"without{fill.rpartition(' ')[0]}, " if fill and Remedy.repair in needed else ""
-        other = (
-            f"{only}use an algorithm for surfaces with holes (see `cembench list algorithms`)"
-            if fill
-            else "add --repair to map or run"
+        does = _LOSSES.get(next(iter(options), ""), does)
+        only = "without --fill-holes, " if fill and Remedy.repair in needed else ""
+        stay = f"{only}use an algorithm for surfaces with holes (see `{several[1]}`)"
+        other = f", or {stay}" if fill else "" if options else ", or add --repair to map or run"
+        advice = repair_advice(path, {**options, **fill})
+        holes = " Use an algorithm for surfaces with holes where they should stay" * bool(fill)
+        yield Advice(
+            f"{advice.python} {does}; its `mesh` is the new surface."
+            + (f"{holes} (see `{several[0]}`)." if fill else ""),
+            f"{advice.shell} {does}{other}.",
         )
-        advice.append(f"`cembench repair {source} -o {mended}{fill}` {does}, or {other}.")
-        source = mended
+        python = "mesh"
+    else:
+        shell = "IN" if path is None else shlex.quote(str(path))
     if Remedy.cut in needed:
-        cut = "OUT" if path is None else f"{shlex.quote(path.stem + '_cut')}.obj"
-        advice.append(
-            f"`cembench cut {source} -o {cut}` makes it a disk, or add --cut to map, which writes "
-            "the UVs for the uncut surface."
+        also = "--repair --cut" if python == "mesh" else "--cut"
+        yield Advice(
+            f"`cembench.cut({python})` makes it a disk; `map_files(cut=True)` writes the UVs for "
+            "the uncut surface.",
+            f"`cembench cut {shell} -o {_named(path, 'cut')}` makes it a disk, or add {also} to "
+            "map, which writes the UVs for the uncut surface.",
         )
     if Remedy.other_algorithm in needed:
-        advice.append("Use an algorithm for disks (see `cembench list algorithms`).")
-    return " ".join(advice)
+        yield Advice(*(f"Use an algorithm for disks (see `{one}`)." for one in several))
+
+
+#: What a repair does that keeps the whole surface only with an option, by its name.
+_LOSSES = {
+    "components": "keeps every piece, each as a surface",
+    "weld": "welds what lies apart by less than that",
+    "drop": "drops what cannot be kept",
+}
 
 
 def located(error: MeshError, path: Path | None) -> MeshError:
@@ -184,8 +204,45 @@ def located(error: MeshError, path: Path | None) -> MeshError:
     if path is None:
         return error
     if isinstance(error, UnusableMeshError):
-        return UnusableMeshError(error.problems, path, error.where)
+        more = error.options, error.notices
+        return UnusableMeshError(error.problems, path, error.where, *more)
+    if isinstance(error, RepairLossError):
+        return RepairLossError(error.kept, error.options, error.better, path)
     return MeshError(f"{path}: {error}")
+
+
+class RepairLossError(MeshError):
+    """A repair would throw away part of a surface; `options` of :func:`cembench.repair` keep it.
+
+    `kept` is what it would keep, `better` what it keeps with the options; these are empty where
+    none keeps the whole surface.
+    """
+
+    def __init__(
+        self,
+        kept: object,
+        options: Mapping[str, float | str],
+        better: object = "",
+        path: Path | None = None,
+    ) -> None:
+        self.kept, self.options, self.better, self.path = kept, dict(options), better, path
+        super().__init__(self._said(lambda one: one.in_python()))
+
+    def _said(self, word: Callable[[Advice], str]) -> str:
+        where = f"{self.path}: " if self.path else ""
+        way = ""
+        if self.options:
+            does = _LOSSES[next(iter(self.options))]
+            way = f"{word(repair_advice(self.path, self.options))} {does}: {self.better}. "
+        drop = word(repair_advice(self.path, {"drop": True}))
+        return f"{where}a repair would keep only {self.kept}. {way}{drop} allows the loss."
+
+    def reword(self, options: Mapping[str, str]) -> None:
+        """Advise commands instead of calls."""
+        self.args = (self._said(lambda one: one.in_shell(options)),)
+
+    def __reduce__(self) -> tuple[type[RepairLossError], tuple[Any, ...]]:
+        return RepairLossError, (self.kept, self.options, self.better, self.path)
 
 
 def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
@@ -546,7 +603,7 @@ def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
     edges, faces = topology.undirected_edges(F)
     bad = np.flatnonzero(faces > 2)
     if not len(bad):
-        return [_one_sided(contradictions)]
+        return [_one_sided(contradictions, closed=bool((faces == 2).all()))]
     i, j = edges[bad[0]].tolist()
     message = (
         f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
@@ -555,13 +612,14 @@ def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
     return [Problem(Defect.edges, len(bad), message)]
 
 
-def _one_sided(contradictions: Indices) -> Problem:
+def _one_sided(contradictions: Indices, *, closed: bool) -> Problem:
     """Return the problem that a surface with manifold edges is one-sided."""
     i, j = contradictions[0].tolist()
+    kind = "closed and one-sided (like a Klein bottle)" if closed else "one-sided (like a Moebius"
     return Problem(
         Defect.one_sided,
         len(contradictions),
-        f"the surface is one-sided (like a Moebius strip): the triangles at edge {i}-{j} "
+        f"the surface is {kind}{'' if closed else ' strip)'}: the triangles at edge {i}-{j} "
         "cannot be oriented consistently; a repair cuts the surface there",
     )
 

@@ -12,6 +12,8 @@ import codecs
 import os
 import stat
 from collections.abc import Callable, Sequence
+from contextlib import suppress
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -24,7 +26,7 @@ from cembench.core.extras import Extra
 from cembench.core.loading import TooLargeError
 from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.defects import array_of, check_finite, located
+from cembench.mesh.defects import array_of, check_finite, located, representatives
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
 from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
@@ -40,12 +42,33 @@ READERS: dict[str, Callable[..., Soup]] = {
     ".stl": stl.read,
     ".mat": mat.read,
     ".npz": npz.read,
-    ".vtk": apart(vtk.read, Extra.FORMATS, "meshio"),
-    ".vtu": apart(vtk.read, Extra.FORMATS, "meshio"),
-    ".vtp": apart(vtk.read_vtp, Extra.VTP, "vtk"),
+    ".vtk": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtu": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtp": apart(vtk.read, Extra.VTP, "vtk"),
+    ".vts": apart(vtk.read, Extra.VTP, "vtk"),
     ".glb": apart(gltf.read, Extra.FORMATS, "trimesh"),
     ".gltf": apart(gltf.read, Extra.FORMATS, "trimesh"),
     ".gii": apart(gii.read, Extra.FORMATS, "nibabel"),
+}
+#: How FreeSurfer geometry begins, whose file names have endings of any kind, and FreeSurfer values.
+_FREESURFER, _VALUES = (b"\xff\xff\xfe", b"\xff\xff\xfd"), b"\xff\xff\xff"
+_read_freesurfer = apart(gii.read_freesurfer, Extra.FORMATS, "nibabel")
+#: Files of other kinds, by the end of their names, and how a surface is made of them.
+_NO_SURFACES = {
+    (".nii", ".nii.gz", ".mgz", ".mgh"): (
+        "it holds a volume, not a surface. Extract one: `V, F, *_ = skimage.measure.marching_cubes("
+        "nibabel.load(file).get_fdata(), level)`, then `cembench.parameterize(V, F)`"
+    ),
+    (".vti", ".vtr"): (
+        "it holds a grid of values, not a surface. Extract one: `pyvista.read(file)"
+        ".contour([value]).save('surface.vtp')`; of heights, `.warp_by_scalar().extract_surface()`"
+    ),
+    (".vtm", ".vtmb", ".pvd", ".pvtp", ".pvtu", ".pvts"): (
+        "it names other files, one for each part. Save them as one: "
+        "`pyvista.read(file).combine().extract_surface().save('surface.vtp')`, or, for a parallel "
+        "file, `pyvista.read(file).save('surface.vtp')`"
+    ),
+    (".gz", ".bz2", ".xz", ".zip", ".7z"): "it is compressed. Unpack it first",
 }
 #: Formats of named arrays.
 _OF_ARRAYS = {".mat": mat.read, ".npz": npz.read}
@@ -62,6 +85,8 @@ _WRITERS: dict[str, Callable[[Soup], bytes]] = {
 _OF_TEXTURES: dict[str, Callable[..., bytes]] = {".ply": ply.write, ".glb": gltf.write}
 #: Formats that hold texture coordinates.
 WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
+#: Those whose texture coordinates are read, of which one for each vertex needs copies of vertices.
+_WITH_UV_OF_VERTICES = (".obj", ".off", ".ply")
 #: Those that hold texture coordinates in single precision.
 SINGLE = (".ply", ".glb")
 _SPECIAL_FILES = (
@@ -115,7 +140,8 @@ def read_soup(
                 f"arrays can be named only for {', '.join(_OF_ARRAYS)} files, not for {suffix}."
             )
         more: dict[str, Any] = {"uv": True} if uv else {}
-        soup = _OF_ARRAYS[suffix](path, arrays) if arrays else READERS[suffix](path, **more)
+        read = READERS.get(suffix) or _library_reader(suffix) or _read_freesurfer
+        soup = _OF_ARRAYS[suffix](path, arrays) if arrays else read(path, **more)
         return (soup.subset(*polygons) if polygons else soup).named(path.stem)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__
@@ -130,6 +156,15 @@ def read_soup(
             f"{path}: the file cannot be read ({error.strerror or error}). Check its permissions "
             "and the disk."
         ) from error
+
+
+def _library_reader(suffix: str) -> Callable[..., Soup] | None:
+    """Return the reader of a format that only an installed library knows, or None."""
+    if suffix in (".3mf", ".dae") and find_spec("trimesh"):
+        return apart(gltf.read, Extra.FORMATS, "trimesh")
+    if suffix in (".msh", ".mesh", ".inp") and find_spec("meshio"):
+        return apart(vtk.read_by_meshio, Extra.FORMATS, "meshio")
+    return None
 
 
 def _check_file(path: Path) -> None:
@@ -156,11 +191,22 @@ def _check_file(path: Path) -> None:
                 f"this is {what}, not a file. Name a mesh file; save the output of a pipe or a "
                 "device to a file first."
             )
+    for ends, what in _NO_SURFACES.items():
+        if path.name.lower().endswith(ends):
+            raise MeshError(f"{what}.")
     if not is_named_like_a_mesh(path):
-        raise MeshError(
-            f"unknown mesh format {path.suffix!r}; allowed: {', '.join(READERS)}. "
-            "Convert the file to one of these."
-        )
+        with path.open("rb") as file:
+            begin = file.read(3)
+        if begin == _VALUES:
+            raise MeshError(
+                "it holds FreeSurfer values of vertices, such as a thickness; name the file of the "
+                "surface, such as lh.pial."
+            )
+        if begin not in _FREESURFER and _library_reader(path.suffix.lower()) is None:
+            raise MeshError(
+                f"unknown mesh format {path.suffix!r}; allowed: {', '.join(READERS)}, and geometry "
+                "of FreeSurfer. Convert the file to one of these."
+            )
     if status.st_size == 0:
         raise MeshError("the file is empty (0 bytes). Export or download it again.")
     with path.open("rb") as file:
@@ -247,16 +293,44 @@ def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]
         Nothing is left of its mesh.
 
     """
-    try:
-        repaired = repair(soup.V, soup.corners, soup.sizes)
-    except MeshError as error:
-        raise located(error, path) from None
+    repaired = repair_soup(soup, path)
     notices = soup.notices + repaired.notices
     return Soup.of_triangles(*repaired.surfaces[0], name=soup.name, notices=notices), repaired
 
 
+def repair_soup(soup: Soup, path: Path | None = None, **options: Any) -> Repaired:
+    """Repair the content of a file, as :func:`cembench.mesh.repair.repair` does.
+
+    Whether coincident vertices are copies is known where the surface was cut by us, and where an
+    OBJ, OFF or PLY file has a texture coordinate for each vertex.
+    """
+    copies = False if any(n.kind is NoticeKind.CUT_OPEN for n in soup.notices) else None
+    if path is not None and copies is None and path.suffix.lower() in _WITH_UV_OF_VERTICES:
+        with suppress(MeshError):  # of texture coordinates, which a repair can do without
+            copies = _has_uv_of_vertices(read_soup(path, uv=True)) or None
+    try:
+        return repair(soup.V, soup.corners, soup.sizes, copies=copies, **options)
+    except MeshError as error:
+        raise located(error, path) from None
+
+
+def _has_uv_of_vertices(soup: Soup) -> bool:
+    """Whether vertices at one position have different texture coordinates, one each."""
+    if (
+        soup.uv is None
+        or len(soup.uv) != len(soup.V)
+        or (soup.uv_triangles != soup.triangles).any()
+    ):
+        return False
+    first = representatives(soup.V)
+    return bool((np.abs(soup.uv - soup.uv[first]) > 0).any())
+
+
 def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
     """Cut the polygons of a file into triangles and check them as a surface of this class.
+
+    Vertices in no polygon of a file are left out, with a notice; arrays must not have any, since
+    their rows would get other numbers.
 
     Raises
     ------
@@ -264,6 +338,8 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
         A check fails.
 
     """
+    if path is not None:
+        soup, _ = soup.without_isolated()
     polygons = int((soup.sizes > 3).sum())
     notices = soup.notices
     if polygons:

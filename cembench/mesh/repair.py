@@ -6,9 +6,10 @@ of them. docs/repair.md says what each does, and why it comes where it does.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Literal, Self
+from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 from cembench.mesh.defects import (
     Defect,
+    RepairLossError,
     UnusableMeshError,
     degenerate,
     duplicates,
@@ -28,7 +30,9 @@ from cembench.mesh.defects import (
 )
 from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
 from cembench.mesh.polygons import triangulate
-from cembench.mesh.side_lengths import side_lengths
+from cembench.mesh.seams import are_copies, coincident_vertices, tolerances_of_gaps
+from cembench.mesh.side_lengths import loop_width, side_lengths
+from cembench.mesh.t_junctions import split_t_junctions
 
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -36,6 +40,8 @@ Components = Literal["largest", "all"]
 
 #: A degenerate triangle with an edge below this share of its longest one is collapsed.
 _NEEDLE = 1e-6
+#: A repair may lose this share of the area without being asked.
+_SMALL = 0.01
 #: Rounds of flips: flipping a degenerate triangle can make its neighbour degenerate.
 _FLIP_ROUNDS = 10
 
@@ -54,10 +60,12 @@ class Step(StrEnum):
     invalid_faces = "invalid_faces_dropped", "faces with a missing or non-finite vertex dropped"
     polygons = "polygons_triangulated", "polygons cut into triangles"
     weld = "vertices_welded", "coincident vertices welded"
+    kept_open = "coincident_vertices_kept", "coincident vertices of a cut kept apart"
     collapse = "degenerate_triangles_collapsed", "degenerate triangles collapsed"
     flip = "degenerate_triangles_flipped", "degenerate triangles flipped"
     degenerate = "degenerate_triangles_dropped", "degenerate triangles dropped"
     duplicate = "duplicate_triangles_dropped", "duplicate triangles dropped"
+    t_junctions = "t_junctions_split", "sides divided at vertices on them"
     edges = "non_manifold_edges_split", "non-manifold edges split"
     vertices = "non_manifold_vertices_split", "non-manifold vertices split"
     orient = "triangles_turned_over", "triangles turned over"
@@ -74,6 +82,30 @@ class Step(StrEnum):
 TITLES: dict[str, str] = {step: step.meaning for step in Step}
 
 
+class Kept(NamedTuple):
+    """How much of a surface a repair keeps."""
+
+    #: Share of the area; duplicate triangles do not count, those without area neither.
+    area: float
+    triangles: int
+    triangles_before: int
+    #: Connected pieces, after welding.
+    pieces: int
+    pieces_before: int
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether no piece and no more than :data:`_SMALL` of the area is lost."""
+        return self.pieces == self.pieces_before and self.area >= 1 - _SMALL
+
+    def __str__(self) -> str:
+        return (
+            f"{100 * self.area:.4g} % of the area, {self.triangles:,} of "
+            f"{self.triangles_before:,} triangles and {self.pieces:,} of "
+            f"{self.pieces_before:,} pieces"
+        )
+
+
 @dataclass(frozen=True)
 class Repaired:
     """Surfaces that are oriented manifolds, and the repairs that were made."""
@@ -82,6 +114,10 @@ class Repaired:
     surfaces: tuple[tuple[Points, Indices], ...]
     #: The count of each step, zeros included.
     steps: dict[Step, int]
+    #: For each surface the input vertex (n,) of each vertex, and the input face (m,) of each
+    #: triangle; -1 for those that fill holes.
+    origins: tuple[tuple[Indices, Indices], ...]
+    kept: Kept
 
     @property
     def counts(self) -> dict[str, int]:
@@ -90,12 +126,11 @@ class Repaired:
 
     @property
     def notices(self) -> tuple[Notice, ...]:
-        """One notice for each step that changed something."""
-        return tuple(
-            Notice(NoticeKind.REPAIRED, f"repaired: {n:,} {TITLES[step]}")
-            for step, n in self.steps.items()
-            if n
-        )
+        """One notice for each step that changed something, and what is kept if not all is."""
+        texts = [f"{n:,} {TITLES[step]}" for step, n in self.steps.items() if n]
+        if not self.kept.is_whole:
+            texts.append(f"{self.kept} are kept")
+        return tuple(Notice(NoticeKind.REPAIRED, f"repaired: {text}") for text in texts)
 
 
 def repair(
@@ -106,6 +141,8 @@ def repair(
     weld: float | None = None,
     fill_holes: int = 0,
     components: Components = "largest",
+    drop: bool = False,
+    copies: bool | None = None,
 ) -> Repaired:
     """Make oriented manifolds out of vertices and faces of any quality.
 
@@ -119,11 +156,17 @@ def repair(
         The number of corners of each polygon, at least 3, where these differ.
     weld : float, optional
         Vertices at most this far apart, in the units of `V`, become one; 0 welds vertices that
-        coincide exactly. By default these are welded unless the surface is a disk already.
+        coincide exactly. By default these are welded unless the surface is a disk, or has holes,
+        and they seem to be a cut.
     fill_holes : int
         Boundary loops with at most this many edges are filled, except the longest of a component.
     components : {"largest", "all"}
         Which connected components are kept; each is a separate surface.
+    drop : bool
+        Whether a piece, or more than 1 % of the area, may be lost.
+    copies : bool, optional
+        Whether coincident vertices are copies that the file's format needs (True), or a cut
+        (False). By default :func:`cembench.mesh.seams.are_copies` decides.
 
     Returns
     -------
@@ -135,6 +178,8 @@ def repair(
     ParameterError
         A tolerance or a number of edges is below 0, a tolerance welds each triangle to nothing, or
         `components` is unknown.
+    RepairLossError
+        A piece, or more than 1 % of the area, would be lost, and `drop` is False.
     UnusableMeshError
         The coordinates are too large or too small to compute with.
     MeshError
@@ -154,28 +199,119 @@ def repair(
     points = np.array(V, dtype=np.float64).reshape(-1, 3)
     faces = np.asarray(faces, dtype=np.int64)
     sizes = np.full(len(faces), faces.shape[-1]) if sizes is None else sizes
-    F = _triangles(points, faces.ravel(), sizes, steps)
+    F, face = _triangles(points, faces.ravel(), sizes, steps)
     steps[Step.isolated] = len(points) - len(np.unique(F))  # removed with all unused vertices
-    given, F = F, _weld(points, F, weld, steps)
+    given, F = F, _weld(points, F, weld, copies, steps)
     wrong_scale = out_of_scale(points, F)
     if wrong_scale is not None:
         raise UnusableMeshError([wrong_scale])
-    F = _repair_degenerate(points, F, steps)
+    before = _Measured.of(points, F, steps[Step.invalid_faces])
+    F, face = _repair_degenerate(points, F, face, steps)
     extra = duplicates(F) if len(F) else np.zeros(0, dtype=bool)
     steps[Step.duplicate] = int(extra.sum())
-    F = F[~extra]
+    F, face = F[~extra], face[~extra]
     if not len(F):
         raise _nothing_left(points, given, weld)
+    if not steps[Step.kept_open]:
+        F, parent, steps[Step.t_junctions] = split_t_junctions(points, F)
+        face = face[parent]
     F, origin = _split(points, F, steps)
-    points = points[origin]
-    F, origin = _orient(F, len(points), steps)
-    points = points[origin]
-    F = _outwards(points, F, steps)
-    surfaces = []
-    for piece in _components(F, len(points), components, steps):
-        own = _compact(points, _drop_ears(piece, steps))
-        surfaces.append(_fill_holes(*own, fill_holes, steps))
-    return Repaired(tuple(surfaces), steps)
+    F, turned = _orient(F, len(origin), steps)
+    origin = origin[turned]
+    F = _outwards(points[origin], F, steps)
+    surfaces: list[tuple[Points, Indices]] = []
+    origins: list[tuple[Indices, Indices]] = []
+    for chosen in _components(F, len(origin), components, steps):
+        chosen = chosen[_without_ears(points[origin], F[chosen], steps)]
+        used, own = np.unique(F[chosen], return_inverse=True)
+        own = own.reshape(-1, 3).astype(np.int64)
+        surface = _fill_holes(points[origin[used]], own, fill_holes, steps)
+        added = [len(new) - len(old) for new, old in zip(surface, (used, own), strict=True)]
+        old = origin[used], face[chosen]
+        surfaces.append(surface)
+        of_vertices, of_faces = (
+            np.append(k, np.full(a, -1)) for k, a in zip(old, added, strict=True)
+        )
+        origins.append((of_vertices, of_faces))
+    kept = before.kept_by(surfaces, origins)
+    if not (drop or kept.is_whole):
+        raise _loss(points, faces.ravel(), sizes, kept, weld, components)
+    return Repaired(tuple(surfaces), steps, tuple(origins), kept)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """Areas and pieces of welded triangles, before any is dropped."""
+
+    area: float
+    count: int
+    piece: Indices  #: of each input vertex; -1 for those in no triangle with an area
+
+    @classmethod
+    def of(cls, V: Points, F: Indices, missing: int) -> _Measured:
+        """Measure triangles; `missing` faces, whose area is unknown, have that of the mean."""
+        whole = F[~degenerate(V, F)] if len(F) else F
+        single = whole[~duplicates(whole)] if len(whole) else whole
+        areas = _areas(V, single)
+        piece = np.full(len(V), -1)
+        if len(single):
+            used = np.unique(single)
+            piece[used] = topology.components(single, len(V))[1][used]
+        total = float(areas.sum()) * (1 + missing / max(len(single), 1))
+        return cls(total, len(single) + missing, piece)
+
+    def kept_by(
+        self, surfaces: Sequence[tuple[Points, Indices]], origins: Sequence[tuple[Indices, Indices]]
+    ) -> Kept:
+        """Return what these surfaces keep; triangles that fill holes do not count."""
+        area, count, pieces = 0.0, 0, [np.array([-1])]
+        for (V, F), (vertices, faces) in zip(surfaces, origins, strict=True):
+            area += float(_areas(V, F[faces >= 0]).sum())
+            count += int((faces >= 0).sum())
+            pieces.append(self.piece[vertices[vertices >= 0]])
+        share = min(area / self.area, 1.0) if self.area else 1.0
+        there = len(np.unique(self.piece[self.piece >= 0]))
+        left = len(np.unique(np.concatenate(pieces))) - 1
+        return Kept(share, count, max(self.count, count), left, there)
+
+
+def _areas(V: Points, F: Indices) -> Points:
+    a, b, c = (V[F[:, k]] for k in range(3))
+    return np.asarray(np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2)
+
+
+def options_without_loss(
+    V: Points, corners: Indices, sizes: Indices
+) -> tuple[dict[str, float | str], Kept] | None:
+    """Return options with which a repair keeps the whole surface, tried on it, and what it keeps.
+
+    Welding comes first: at the gaps between boundary vertices. None if no option does.
+    """
+    F, _ = _triangles(V, corners, sizes, dict.fromkeys(Step, 0))
+    F = coincident_vertices(V, F)[F] if len(F) else F
+    tried: list[dict[str, Any]] = [{"weld": one} for one in tolerances_of_gaps(V, F)]
+    for options in (*tried, {"components": "all"}):
+        try:
+            return options, repair(V, corners, sizes, **options).kept
+        except (MeshError, ParameterError):
+            continue
+    return None
+
+
+def _loss(
+    V: Points,
+    corners: Indices,
+    sizes: Indices,
+    kept: Kept,
+    weld: float | None,
+    components: Components,
+) -> RepairLossError:
+    """Return the error that a repair would lose part of a surface, with the way to keep it."""
+    if weld is None and components == "largest":  # else the user has chosen
+        found = options_without_loss(V, corners, sizes)
+        if found is not None:
+            return RepairLossError(kept, *found)
+    return RepairLossError(kept, {})
 
 
 def _nothing_left(V: Points, F: Indices, weld: float | None) -> MeshError | ParameterError:
@@ -203,8 +339,10 @@ def _check_options(weld: float | None, fill_holes: int, components: str) -> None
         raise ParameterError(f"components={components!r} is unknown; allowed: 'largest', 'all'.")
 
 
-def _triangles(V: Points, corners: Indices, sizes: Indices, steps: dict[Step, int]) -> Indices:
-    """Cut the faces whose vertices exist and are finite into triangles."""
+def _triangles(
+    V: Points, corners: Indices, sizes: Indices, steps: dict[Step, int]
+) -> tuple[Indices, Indices]:
+    """Cut the faces whose vertices exist and are finite into triangles; also return their faces."""
     polygon = np.repeat(np.arange(len(sizes)), sizes)
     finite = np.append(np.isfinite(V).all(axis=1), False)
     inside = (corners >= 0) & (corners < len(V))
@@ -213,43 +351,64 @@ def _triangles(V: Points, corners: Indices, sizes: Indices, steps: dict[Step, in
     corners, sizes = corners[~bad[polygon]], sizes[~bad]
     steps[Step.invalid_faces] = int(bad.sum())
     steps[Step.polygons] = int((sizes > 3).sum())
-    return corners[triangulate(V, corners, sizes)]
+    return corners[triangulate(V, corners, sizes)], np.repeat(np.flatnonzero(~bad), sizes - 2)
 
 
-def _weld(V: Points, F: Indices, tolerance: float | None, steps: dict[Step, int]) -> Indices:
+def _weld(
+    V: Points, F: Indices, tolerance: float | None, copies: bool | None, steps: dict[Step, int]
+) -> Indices:
     """Replace coincident vertices in the triangles by one of them; the others become isolated."""
     if tolerance and not (side_lengths(V, F) > tolerance).any():
         return F[:0]  # soon told, where the pairs of vertices would fill memory
     used, compact = np.unique(F, return_inverse=True)
-    first = used[representatives(V[used], tolerance or 0.0)]
-    if tolerance is None and (first != used).any() and _is_disk(V[used], compact.reshape(-1, 3)):
+    compact = compact.reshape(-1, 3)
+    points = V[used]
+    if tolerance is None:
+        same = coincident_vertices(points, compact)
+    else:
+        same = representatives(points, tolerance)
+    extra = int((same != np.arange(len(used))).sum())
+    if (
+        tolerance is None
+        and extra
+        and not (are_copies(compact, same) if copies is None else copies)
+        and _can_be_mapped(points, compact)
+    ):
+        steps[Step.kept_open] = extra
         return F
-    steps[Step.weld] = int((first != used).sum())
+    steps[Step.weld] = extra
     number = np.arange(len(V))
-    number[used] = first
+    number[used] = used[same]
     return number[F]
 
 
-def _is_disk(V: Points, F: Indices) -> bool:
-    """Whether triangles, apart from degenerate ones, form a manifold that is a disk.
+def _can_be_mapped(V: Points, F: Indices) -> bool:
+    """Whether triangles, apart from degenerate ones, are a disk or have holes, without handles.
 
-    A connected manifold with boundary is one if its Euler characteristic is 1.
+    A connected manifold with b boundary loops is one if its Euler characteristic is 2 - b.
     """
     edges, _, faces = edges_of_half_edges(F)
-    if len(V) - len(edges) + len(F) != 1 or not (faces == 1).any():
+    rim, ends = np.unique(edges[faces == 1], return_inverse=True)
+    if not len(rim):
+        return False
+    loops = topology.components(ends.reshape(-1, 2), len(rim))[0]
+    if len(V) - len(edges) + len(F) != 2 - loops:
         return False
     harmless = {Defect.scale, Defect.coincident, Defect.degenerate, Defect.orientation}
     return {problem.defect for problem in examine(V, F, connected=True).problems} <= harmless
 
 
-def _repair_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
+def _repair_degenerate(
+    V: Points, F: Indices, face: Indices, steps: dict[Step, int]
+) -> tuple[Indices, Indices]:
     """Collapse needles, flip triangles with collinear corners, drop the rest."""
     for _ in range(_FLIP_ROUNDS):
-        F, dropped = _without(F, _repeats_a_vertex(F))
-        steps[Step.degenerate] += dropped
+        keep = ~_repeats_a_vertex(F)
+        steps[Step.degenerate] += int((~keep).sum())
+        F, face = F[keep], face[keep]
         bad = np.flatnonzero(degenerate(V, F))
         if not len(bad):
-            return F
+            return F, face
         F, collapsed = _collapse_needles(V, F, bad)
         steps[Step.collapse] += collapsed
         steps[Step.degenerate] -= collapsed  # the next round drops what a collapse leaves
@@ -258,14 +417,9 @@ def _repair_degenerate(V: Points, F: Indices, steps: dict[Step, int]) -> Indices
             steps[Step.flip] += flipped
             if not flipped:
                 break
-    F, dropped = _without(F, _repeats_a_vertex(F) | degenerate(V, F))
-    steps[Step.degenerate] += dropped
-    return F
-
-
-def _without(F: Indices, bad: NDArray[np.bool_]) -> tuple[Indices, int]:
-    """Return the triangles that are not bad, and the number of bad ones."""
-    return F[~bad], int(bad.sum())
+    keep = ~(_repeats_a_vertex(F) | degenerate(V, F))
+    steps[Step.degenerate] += int((~keep).sum())
+    return F[keep], face[keep]
 
 
 def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
@@ -382,15 +536,43 @@ def _smoothest_pairs(V: Points, F: Indices, edge: Indices, faces: Indices) -> In
 
 def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indices]:
     """Orient each piece consistently, and cut one-sided ones where triangles contradict."""
-    F, turned, contradictions = oriented(F)
+    given, (F, turned, contradictions) = F, oriented(F)
     steps[Step.orient] = int(turned.sum())
-    steps[Step.one_sided] = len(contradictions)
     if not len(contradictions):
         return F, np.arange(n)
+    F = _straightened(F)
+    pairs, agree = _agreeing(F)
+    steps[Step.orient] = int((given != F).any(axis=1).sum())
+    steps[Step.one_sided] = int((~agree).sum())
+    return glue(F, pairs[agree], n)
+
+
+def _agreeing(F: Indices) -> tuple[Indices, NDArray[np.bool_]]:
+    """Return the pairs of half-edges (k, 2), and whether the two triangles of each agree."""
     _, edge, faces = edges_of_half_edges(F)
     pairs = paired_half_edges(edge, faces)
-    agree = F.ravel()[pairs[:, 0]] != F.ravel()[pairs[:, 1]]
-    return glue(F, pairs[agree], n)
+    return pairs, F.ravel()[pairs[:, 0]] != F.ravel()[pairs[:, 1]]
+
+
+def _straightened(F: Indices) -> Indices:
+    """Turn over triangles that contradict two neighbours or three, until there are none.
+
+    A cut along what is left hangs no triangle on by one side.
+    """
+    pairs, agree = _agreeing(F)
+    pair = np.full(F.size, -1)
+    pair[pairs.ravel()] = np.repeat(np.arange(len(pairs)), 2)
+    sides = pair.reshape(-1, 3)
+    turned = np.zeros(len(F), dtype=bool)
+    queue = np.unique(pairs[~agree] // 3).tolist()
+    while queue:
+        t = queue.pop()
+        own = sides[t][sides[t] >= 0]
+        if (~agree[own]).sum() >= 2:  # turning it lowers the number of contradictions
+            agree[own] = ~agree[own]
+            turned[t] = ~turned[t]
+            queue += (pairs[own] // 3).ravel().tolist()
+    return np.where(turned[:, None], F[:, ::-1], F)
 
 
 def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
@@ -409,7 +591,7 @@ def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
 
 
 def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) -> list[Indices]:
-    """Return the triangles of the components that are kept, the largest first."""
+    """Return the numbers of the triangles of each component that is kept, the largest first."""
     _, label = topology.components(F, n)
     pieces, piece, sizes = np.unique(label[F[:, 0]], return_inverse=True, return_counts=True)
     order = np.argsort(-sizes, kind="stable")
@@ -417,24 +599,35 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
         steps[Step.components] = len(pieces) - 1
         steps[Step.component_faces] = int(len(F) - sizes[order[0]])
         order = order[:1]
-    by_piece = np.split(F[np.argsort(piece, kind="stable")], np.cumsum(sizes)[:-1])
+    by_piece = np.split(np.argsort(piece, kind="stable"), np.cumsum(sizes)[:-1])
     return [by_piece[k] for k in order]
 
 
-def _drop_ears(F: Indices, steps: dict[Step, int]) -> Indices:
-    """Drop triangles with two sides on the boundary until there are none.
+def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.bool_]:
+    """Whether each triangle stays when those with two sides on a hole are dropped.
 
-    A surface that would vanish, such as a strip of triangles, is kept as it is.
+    In a map to a disk with round holes they fold. None is dropped on the outer boundary, the widest
+    loop, or where they have more than :data:`_SMALL` of the area.
     """
-    left = F
-    while len(left):
+    keep = np.ones(len(F), dtype=bool)
+    if len(loops := topology.boundary_loops(F, len(V))) < 2:
+        return keep
+    outer = np.zeros(len(V), dtype=bool)
+    outer[max(loops, key=lambda loop: loop_width(V[loop]))] = True
+    while True:
+        left = F[keep]
         _, edge, faces = edges_of_half_edges(left)
-        ears = (faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2
+        open_ = (faces[edge] == 1).reshape(-1, 3)
+        ends = open_ | np.roll(open_, 1, axis=1)
+        ears = (open_.sum(axis=1) >= 2) & ~(outer[left] & ends).any(axis=1)
         if not ears.any():
-            steps[Step.ears] += len(F) - len(left)
-            return left
-        left = left[~ears]
-    return F
+            break
+        keep[np.flatnonzero(keep)[ears]] = False
+    areas = _areas(V, F)
+    if areas[~keep].sum() > _SMALL * areas.sum():
+        return np.ones(len(F), dtype=bool)
+    steps[Step.ears] += int((~keep).sum())
+    return keep
 
 
 def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tuple[Points, Indices]:
@@ -464,9 +657,3 @@ def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tup
     if not new_faces:
         return V, F
     return np.vstack([V, *new_points]), np.concatenate([F, *new_faces])
-
-
-def _compact(V: Points, F: Indices) -> tuple[Points, Indices]:
-    """Keep the vertices that triangles use, in order."""
-    used, F = np.unique(F, return_inverse=True)
-    return V[used], F.reshape(-1, 3).astype(np.int64)

@@ -24,3 +24,11 @@ def side_lengths(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.flo
     """
     lengths: NDArray[np.float64] = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
     return lengths
+
+
+def loop_width(loop: NDArray[np.float64]) -> float:
+    """Return the mean square distance of a closed polygon's points (k, 3) from their centroid."""
+    after, middle = np.roll(loop, -1, axis=0), (loop + np.roll(loop, -1, axis=0)) / 2
+    lengths = np.linalg.norm(after - loop, axis=1)
+    away = middle - np.average(middle, axis=0, weights=lengths)
+    return float(np.average((away**2).sum(axis=1), weights=lengths))

@@ -8,16 +8,17 @@ whose content does not match its declarations never becomes a soup: its reader r
 
 from __future__ import annotations
 
+import re
 import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from cembench.core.errors import MeshError
-from cembench.core.notices import Notice
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.polygons import triangulate
 
 Points = NDArray[np.float64]
@@ -29,6 +30,8 @@ NO_UV = -1
 #: Characters that `str.split` treats as space but no mesh format does.
 _NOT_SPACES = dict.fromkeys(map(ord, "\x1c\x1d\x1e\x1f\x85\xa0"), "\0")
 
+#: A number as many European programs write it.
+_DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 #: The byte order mark of UTF-8, decoded as Latin-1.
 BYTE_ORDER_MARK = b"\xef\xbb\xbf".decode("latin-1")
 
@@ -101,29 +104,32 @@ class Soup:
 
         """
         V = np.asarray(V, dtype=np.float64).reshape(-1, 3)
-        corners = np.asarray(corners, dtype=np.int64).ravel() - counted_from
-        sizes = np.asarray(sizes, dtype=np.int64)
-        if not len(sizes) and more.get("uv") is None:
-            raise MeshError(
-                f"no faces: {len(V)} vertices were found, but not one triangle or polygon. The "
-                "file holds a point cloud, was cut short, or is of another format than its name "
-                "says; export or download it again, as a surface."
-            )
-        small = np.flatnonzero(sizes < 3)
+        places: Indices = np.asarray(corners, dtype=np.int64).ravel() - counted_from
+        counts: Indices = np.asarray(sizes, dtype=np.int64)
+        if not len(counts) and more.get("uv") is None:
+            raise no_faces(len(V))
+        lines = np.flatnonzero(counts == 2)
+        if 0 < len(lines) < len(counts) and more.get("uv") is None:
+            of_line = np.repeat(counts == 2, counts)
+            places, counts = places[~of_line], np.delete(counts, lines)
+            text = f"{len(lines):,} faces with two corners, which are lines, were ignored"
+            notices = (*more.get("notices", ()), Notice(NoticeKind.LINES_IGNORED, text))
+            more = {**more, "notices": notices}
+        small = np.flatnonzero(counts < 3)
         if len(small):
             raise damaged(
-                f"face {small[0]} (counted from 0) has {sizes[small[0]]} corners; at least 3 are "
+                f"face {small[0]} (counted from 0) has {counts[small[0]]} corners; at least 3 are "
                 "needed"
             )
-        bad = np.flatnonzero((corners < 0) | (corners >= len(V)))
+        bad = np.flatnonzero((places < 0) | (places >= len(V)))
         if len(bad):
-            face = np.searchsorted(np.cumsum(sizes), bad[0], side="right")
+            face = np.searchsorted(np.cumsum(counts), bad[0], side="right")
             raise damaged(
                 f"face {face} (counted from 0) has a vertex index out of range, "
-                f"{corners[bad[0]] + counted_from}; allowed is {counted_from} to "
+                f"{places[bad[0]] + counted_from}; allowed is {counted_from} to "
                 f"{len(V) - 1 + counted_from}"
             )
-        return cls(V, corners, sizes, **more)
+        return cls(V, places, counts, **more)
 
     def named(self, name: str) -> Self:
         """Return the same soup under another name."""
@@ -147,6 +153,19 @@ class Soup:
         corners = self.corners[ends[first] - self.sizes[first] : ends[last]]
         used, corners = np.unique(corners, return_inverse=True)
         return replace(self, V=self.V[used], corners=corners, sizes=self.sizes[first : last + 1])
+
+    def without_isolated(self) -> tuple[Self, Indices]:
+        """Return the soup without vertices in no polygon, and the numbers of the others."""
+        used, corners = np.unique(self.corners, return_inverse=True)
+        if len(used) == len(self.V):
+            return self, used
+        first = int(np.setdiff1d(np.arange(len(self.V)), used)[0])
+        text = (
+            f"{len(self.V) - len(used):,} vertices in no triangle were left out, the first being "
+            f"{first} (counted from 0)"
+        )
+        notices = (*self.notices, Notice(NoticeKind.ISOLATED_LEFT_OUT, text))
+        return replace(self, V=self.V[used], corners=corners.reshape(-1), notices=notices), used
 
     @property
     def triangles(self) -> Indices:
@@ -258,10 +277,53 @@ def shown(text: str, most: int = 60) -> str:
     return repr(text if len(text) <= most else text[:most] + "...")
 
 
+class NotANumberError(ValueError):
+    """A word of a text file is no number; the message says why."""
+
+
+_N = TypeVar("_N", int, float)
+
+
+def to_number(kind: type[_N], word: str) -> _N:
+    """Return a word as an integer or a floating-point number.
+
+    Raises
+    ------
+    NotANumberError
+        It is not one.
+
+    """
+    try:
+        return kind(word)
+    except ValueError:
+        whole = "whole " * (kind is int and _DECIMAL_COMMA.fullmatch(word) is None)
+        raise NotANumberError(f"{shown(word)} is not a {whole}number") from None
+
+
+def unreadable(where: str, line: str, error: Exception) -> MeshError:
+    """Return the error of a line that cannot be read; decimal commas are no damage."""
+    if any(_DECIMAL_COMMA.fullmatch(word) for word in line.split()):
+        return MeshError(
+            f"{where}, {shown(line)}: the numbers have decimal commas. Export the file with "
+            "decimal points, or replace each comma by a point."
+        )
+    why = error if isinstance(error, ValueError) else "a number is too large"
+    return damaged(f"{where}, {shown(line)}: {why}")
+
+
 def refuse_underscores(fields: list[str]) -> None:
     """Raise :class:`ValueError` for numbers that only Python accepts, such as 1_000."""
     if "_" in "".join(fields):
         raise ValueError("an underscore is not part of a number")
+
+
+def no_faces(n: int) -> MeshError:
+    """Return the error that a file has vertices only."""
+    return MeshError(
+        f"no faces: {n} vertices were found, but not one triangle or polygon. The file holds a "
+        "point cloud, was cut short, or is of another format than its name says; export or "
+        "download it again, as a surface."
+    )
 
 
 def damaged(what: str) -> MeshError:

@@ -48,9 +48,9 @@ def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
 
 
 def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
-    """Return the number of connected components, and the component of each vertex."""
-    # Two sides connect the corners of a triangle.
-    i, j = np.repeat(F[:, 0], 2), F[:, 1:].ravel()
+    """Return the number of connected components of triangles or edges, and that of each vertex."""
+    # Two sides connect the corners of a triangle, one the ends of an edge.
+    i, j = np.repeat(F[:, 0], F.shape[1] - 1), F[:, 1:].ravel()
     graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
     count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)

@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 import scipy
@@ -26,6 +26,7 @@ from cembench.mesh.defects import (
     Defect,
     Problem,
     Remedy,
+    RepairLossError,
     UnusableMeshError,
     as_arrays,
     check_finite,
@@ -33,7 +34,9 @@ from cembench.mesh.defects import (
     examine,
     some,
 )
+from cembench.mesh.plausibility import implausible
 from cembench.mesh.repair import repair
+from cembench.mesh.side_lengths import loop_width
 
 #: Boundary loops, each as its vertices in order.
 Loops = Sequence[NDArray[np.int64]]
@@ -95,7 +98,9 @@ class TriangleMesh:
         V, F = as_arrays(V, F)
         F, remarks, problems = examine(V, F, connected=kind is not TriangleMesh)
         if problems:
-            raise UnusableMeshError([*problems, *_problems_when_repaired(kind, V, F, problems)])
+            more, options = _when_repaired(kind, V, F, problems)
+            wrong = implausible(V, F, sheets=False)
+            raise UnusableMeshError([*problems, *more], options=options, notices=wrong)
         loops = topology.boundary_loops(F, len(V))
         try:
             notices += remarks + kind._check_topology(V, F, loops)
@@ -138,6 +143,14 @@ class TriangleMesh:
     def renamed(self, name: str) -> Self:
         """Return the same mesh under another name."""
         return self.trusted(self.V, self.F, printable(name), self.notices)
+
+    def noted(self, notices: tuple[Notice, ...]) -> Self:
+        """Return the same mesh with more notices."""
+        if not notices:
+            return self
+        mesh = self.trusted(self.V, self.F, self.name, (*self.notices, *notices))
+        mesh.__dict__["loops"] = self.loops
+        return mesh
 
     def moved(self, V: ArrayLike) -> Self:
         """Return the same triangles with other vertex positions, finite and real (n, 3)."""
@@ -309,7 +322,7 @@ class HoledMesh(TriangleMesh):
         ]
         loops = [self.loops[k] for k in np.argsort(lengths, kind="stable")[::-1]]
         if outer is None:
-            widest = int(np.argmax([_width(self.V[loop]) for loop in loops]))
+            widest = int(np.argmax([loop_width(self.V[loop]) for loop in loops]))
             return loops.pop(widest), tuple(loops)
         chosen = [k for k, loop in enumerate(loops) if (loop == outer).any()]
         if not chosen:
@@ -339,31 +352,38 @@ class HoledMesh(TriangleMesh):
         return definition_1_notices(F, len(V), loops)
 
 
-def _width(loop: NDArray[np.float64]) -> float:
-    """Return the mean square distance of a closed polygon's points (k, 3) from their centroid."""
-    after, middle = np.roll(loop, -1, axis=0), (loop + np.roll(loop, -1, axis=0)) / 2
-    lengths = np.linalg.norm(after - loop, axis=1)
-    away = middle - np.average(middle, axis=0, weights=lengths)
-    return float(np.average((away**2).sum(axis=1), weights=lengths))
-
-
-def _problems_when_repaired(
+def _when_repaired(
     kind: type[TriangleMesh],
     V: NDArray[np.float64],
     F: NDArray[np.int64],
     known: tuple[Problem, ...],
-) -> tuple[Problem, ...]:
-    """Return the problems that would keep the surface from its class after a repair."""
+) -> tuple[tuple[Problem, ...], dict[str, Any]]:
+    """Return the problems that would keep the surface from its class after a repair.
+
+    Also the options with which a repair keeps the whole surface.
+    """
     if any(problem.remedy is Remedy.rescale for problem in known):
-        return ()
+        return (), {}
+    options: dict[str, Any] = {}
     try:
-        V, F = repair(V, F).surfaces[0]
+        repaired = repair(V, F)
+    except RepairLossError as error:
+        options = error.options or {"drop": True}
+        repaired = repair(V, F, **options)
+    except MeshError:  # nothing would be left of it, so only its own defects are reported
+        return (), {}
+    V, F = repaired.surfaces[0]
+    try:
         kind._check_topology(V, F, topology.boundary_loops(F, len(V)))
     except UnusableMeshError as error:
-        return error.problems
-    except MeshError:  # nothing would be left of it, so only its own defects are reported
-        return ()
-    return ()
+        one_sided = any(problem.defect is Defect.one_sided for problem in known)
+        return tuple(_of_cut(one) if one_sided else one for one in error.problems), options
+    return (), options
+
+
+def _of_cut(problem: Problem) -> Problem:
+    """Return a problem that a one-sided surface has once it is cut; another cut removes it."""
+    return replace(problem, text=f"once it is cut, {problem.text}", other_remedy=Remedy.cut)
 
 
 def _refuse_closed(F: NDArray[np.int64], n: int, loops: Loops) -> None:

@@ -109,11 +109,19 @@ def judged_atlas(mesh: TriangleMesh, corners: Complex) -> list[Fault]:
 
 
 def broken_premises(mesh: TriangleMesh) -> list[str]:
-    """Return a remark if a mesh breaks a premise of the paper, else nothing."""
+    """Return a remark if a mesh breaks a premise of the paper, else nothing.
+
+    A disk without interior vertices is flat, so a free boundary maps it exactly; so is a surface
+    with holes once it is cut.
+    """
     broken = definition_1_notices(mesh.F, mesh.n, mesh.loops) if mesh.loops else ()
-    return (
-        [f"the mesh breaks a premise of the paper: {'; '.join(map(str, broken))}"] if broken else []
-    )
+    if not broken:
+        return []
+    remark = f"the mesh breaks a premise of the paper: {'; '.join(map(str, broken))}"
+    if len(mesh.interior):
+        return [remark]
+    cut = "--cut " if len(mesh.loops) > 1 else ""
+    return [remark, f"a free boundary unrolls it exactly: {cut}-a lscm"]
 
 
 def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Notice]:

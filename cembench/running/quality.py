@@ -29,6 +29,7 @@ from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.cholesky import Cholesky
+from cembench.mesh.cut import cut_open
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, definition_1_notices
 
 #: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
@@ -62,7 +63,7 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         return notes
     known = yardstick(target, figures)
     reachable = np.inf if known is None else float(figures.angle_errors_of(known).mean())
-    free = free_error(mesh) if error > COMPARED else np.inf
+    free, advice = free_map(mesh) if error > COMPARED else (np.inf, "")
     most = FAR * reachable, FAR_FROM_FREE * free, COLLAPSED * collapsed_error(figures), POOR
     if error <= min(most):
         return notes
@@ -72,7 +73,7 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         compared = f"but {harmonic} reaches {reachable:.2f}"
         causes = causes or "the method, not the mesh"
     elif error > FAR_FROM_FREE * free:
-        compared = f"but a free boundary, e.g. -a abf-linear, reaches {free:.2g}"
+        compared = f"but a free boundary reaches {free:.2g} with {advice}"
         causes = causes or "the surface is too long, or its mesh too coarse, for this domain"
     else:
         others = {harmonic: reachable, "a free boundary": free}
@@ -110,10 +111,12 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
         f"degrees{cost}"
     )
     if done["mean_value_vertices"] == len(mesh.interior):
-        message += (
-            ". The surface may be too long for one disk: a free boundary has room for it, "
-            "e.g. -a abf-linear"
-        )
+        free, advice = free_map(mesh)
+        if free < error:
+            message += (
+                f". The surface may be too long for one disk: a free boundary reaches {free:.2g} "
+                f"with {advice}"
+            )
     return [Notice(NoticeKind.LAST_RESORT, message)]
 
 
@@ -159,19 +162,27 @@ def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) ->
     return causes
 
 
-def free_error(mesh: TriangleMesh) -> float:
-    """Return the mean angle error of the map with a free boundary of least E_C, in degrees.
+def free_map(mesh: TriangleMesh) -> tuple[float, str]:
+    """Return the mean angle error of a map with a free boundary, in degrees, and how to get it.
 
-    One factorisation: two boundary vertices are pinned (LSCM). Infinite where it has folds, where
-    it cannot be computed, and above :data:`MOST_TRIANGLES`.
+    It is the map of least E_C by the surface's triangles or by the intrinsic Delaunay ones (LSCM),
+    of a surface with holes that of the disk it is cut into: one factorisation each. Infinite where
+    it has folds, where it cannot be computed, and above :data:`MOST_TRIANGLES`.
     """
+    best = np.inf, ""
     if not isinstance(mesh, DiskMesh | HoledMesh) or mesh.m > MOST_TRIANGLES:
-        return np.inf
-    try:
-        uv = pinned_map(laplacian(mesh, delaunay=True), mesh.loops, two_distant_vertices(mesh))
-    except AlgorithmFailed:
-        return np.inf
-    return np.inf if flipped_triangles(mesh, uv) else float(angle_errors(mesh, uv).mean())
+        return best
+    disk, cut = (mesh, "") if isinstance(mesh, DiskMesh) else (cut_open(mesh).mesh, "--cut ")
+    pins = two_distant_vertices(disk)
+    for delaunay, option in ((False, ""), (True, " -p delaunay=true")):
+        try:
+            uv = pinned_map(laplacian(disk, delaunay=delaunay), disk.loops, pins)
+        except AlgorithmFailed:
+            continue
+        error = float(angle_errors(disk, uv).mean())
+        if not flipped_triangles(disk, uv) and error < BETTER * best[0]:
+            best = error, f"{cut}-a lscm{option}"
+    return best
 
 
 def yardstick(target: str, figures: MapFigures) -> Complex | None:

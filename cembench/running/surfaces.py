@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias, TypeGuard, TypeVar, cast
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from cembench.core.errors import MeshError
@@ -16,24 +15,19 @@ from cembench.core.names import did_you_mean
 from cembench.core.wording import Advice
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.datasets import is_fetched, surface_file
-from cembench.mesh.defects import as_arrays, located
+from cembench.mesh.defects import located
 from cembench.mesh.files import checked, mesh_names, most_special, read_soup, repaired_soup
-from cembench.mesh.formats.vtk import soup_of_cells
 from cembench.mesh.repair import Repaired
-from cembench.mesh.soup import Soup, damaged
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry, load_registry
+from cembench.running.foreign_meshes import soup_of
 
 M = TypeVar("M", bound=TriangleMesh)
 
 #: A checked mesh; the path of a mesh file; the name of a generated surface, or of a public one that
-#: was fetched; arrays (V, F); an object with `vertices` and `faces` (trimesh), with `points` and
-#: `faces` (PyVista), with `points` and `cells` (meshio), or a mesh of pymeshlab.
+#: was fetched; arrays (V, F); what :func:`cembench.running.foreign_meshes.soup_of` takes.
 SurfaceInput: TypeAlias = TriangleMesh | str | os.PathLike[str] | tuple[ArrayLike, ArrayLike] | Any
-
-#: Methods of other libraries that return a mesh: of trimesh's scenes, PyVista's grids, pymeshlab's
-#: sets.
-_MESH_FROM = ("to_mesh", "extract_surface", "current_mesh")
 
 #: The kinds of surface that algorithms take, the most special first.
 KINDS: tuple[type[TriangleMesh], ...] = (DiskMesh, HoledMesh)
@@ -156,59 +150,6 @@ def prepared(
             raise located(error, path) from None
         return SurfaceFile(file, opened.mesh, repaired, uncut, opened)
     return SurfaceFile(file, most_special(soup, kinds, path), repaired)
-
-
-def soup_of(surface: Any) -> Soup:
-    """Return the polygons of a mesh, of a pair of arrays, or of another library's mesh, unchecked.
-
-    Raises
-    ------
-    MeshError
-        It is none of these, or its arrays are not those of triangles.
-
-    """
-    if isinstance(surface, TriangleMesh):
-        return Soup.of_triangles(surface.V, surface.F, name=surface.name)
-    points = getattr(surface, "vertices", getattr(surface, "points", None))
-    if hasattr(surface, "faces") and points is not None:
-        faces = np.asarray(surface.faces)
-        if faces.ndim == 1 and faces.size:
-            return Soup.from_arrays(points, *_unpadded(faces))
-        return Soup.of_triangles(*as_arrays(points, faces))
-    if points is not None and isinstance(getattr(surface, "cells", None), list):
-        return soup_of_cells(points, surface.cells)
-    if hasattr(surface, "vertex_matrix") and hasattr(surface, "face_matrix"):
-        return Soup.of_triangles(*as_arrays(surface.vertex_matrix(), surface.face_matrix()))
-    if isinstance(surface, tuple | list) and len(surface) == 2:
-        return Soup.of_triangles(*as_arrays(*surface))
-    raise MeshError(
-        "a surface is a mesh, a path, the name of a registered surface, a pair of arrays (V, F), "
-        f"or an object with vertices and faces; got {_described(surface)}"
-    )
-
-
-def _described(surface: Any) -> str:
-    """Return what was given instead of a surface, and how to make one of it if that is known."""
-    name = type(surface).__name__
-    if isinstance(surface, tuple | list):
-        few = " igl.readOBJ returns F as the fourth: write (found[0], found[3])."
-        return f"{name} of {len(surface)} items.{few * (len(surface) == 6)}"
-    for method in _MESH_FROM:
-        if hasattr(surface, method):
-            return f"{name}, which holds one: write {method}() of it."
-    arrays = " without its faces: write (V, F)." if isinstance(surface, np.ndarray) else "."
-    return f"{name}{arrays}"
-
-
-def _unpadded(faces: Any) -> tuple[Any, Any]:
-    """Return corners and sizes of polygons from PyVista's one array: size, corners, size, ..."""
-    starts, at = [], 0
-    while at < len(faces):
-        starts.append(at)
-        if faces[at] < 3 or at + faces[at] >= len(faces):
-            raise damaged(f"faces[{at}] is {faces[at]}, which is not the size of a polygon")
-        at += 1 + int(faces[at])
-    return np.delete(faces, starts), faces[starts]
 
 
 def kinds_of(algorithms: Iterable[Algorithm]) -> list[type[TriangleMesh]]:

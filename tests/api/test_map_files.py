@@ -52,8 +52,10 @@ def test_texture_coordinates_lie_in_the_unit_square_unless_asked(result, suffix,
     assert 0.99 <= uv.max() <= 1
     uv = uv_of(result.save(tmp_path / f"b{suffix}", uv="disk"))
     np.testing.assert_allclose(uv, result.uv, atol=1e-6)
-    with pytest.raises(cembench.ParameterError, match="write one of 'unit', 'disk'"):
-        result.save(tmp_path / f"c{suffix}", uv="square")
+    with pytest.raises(
+        cembench.ParameterError, match="write one of 'unit', 'square', 'world', 'disk'"
+    ):
+        result.save(tmp_path / f"c{suffix}", uv="round")
 
 
 def test_a_checkerboard_is_found_from_obj_and_from_ply(result, tmp_path):
@@ -175,7 +177,7 @@ def test_a_regular_mesh_is_written_with_its_map(cli, result, tmp_path):
         (("--remesh", "a.fbx"), "is unknown; allowed here"),
         (("--html", "a.obj"), "use the suffix .html"),
         (("--html", "no/a.html"), "there is no folder no"),
-        (("-o", "a.obj", "--uv", "square"), "'square' is not one of"),
+        (("-o", "a.obj", "--uv", "round"), "'round' is not one of"),
         (("-a", "lscm", "--remesh", "a.obj"), "does not cover the disk"),
     ],
 )

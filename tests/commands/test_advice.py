@@ -42,6 +42,8 @@ def test_the_commands_that_an_error_names_end_in_a_map(cli, verb, V, F):
             code, _, err = cli(*command)
             assert code == 0, err
             file = command[command.index("-o") + 1]
+            if "--components" in command:
+                file = file.replace(".obj", "_1.obj")
 
 
 @pytest.mark.parametrize("surface", [gallery.flat_rectangle(4, 5), gallery.octahedron()])
@@ -67,9 +69,8 @@ def test_a_hole_is_filled_or_kept_as_the_error_says(cli):
     code, _, err = cli("map", "mine.obj", "-a", "cem")
     assert code == 2
     assert "`cembench repair mine.obj -o mine_repaired.obj --fill-holes 6`" in " ".join(err.split())
-    assert "without --fill-holes, use an algorithm for surfaces with holes" in " ".join(err.split())
-    assert cli("repair", "mine.obj", "-o", "mine_repaired.obj")[0] == 0
-    assert cli("map", "mine_repaired.obj", "-a", "koebe-cem")[0] == 0
+    assert "or use an algorithm for surfaces with holes" in " ".join(err.split())
+    assert cli("map", "mine.obj", "-a", "koebe-cem")[0] == 0
 
 
 DISK, OTHER, TWO = "mine.obj", "other.obj", "two.obj"

@@ -10,7 +10,7 @@ import pytest
 import cembench
 from cembench.core import errors, extras
 from cembench.core.notices import NoticeKind
-from cembench.mesh.defects import Defect, UnusableMeshError
+from cembench.mesh.defects import Defect, RepairLossError, UnusableMeshError
 from cembench.mesh.uvs import OtherSurfaceError
 from cembench.results.records import FaultKind
 from cembench.running.external.exchange import ProgramFault
@@ -19,7 +19,7 @@ DOCS = Path(__file__).parents[2] / "docs"
 CLASSES = {
     *(name for name, value in vars(errors).items() if isinstance(value, type)),
     *(one.__name__ for one in (extras.MissingExtra, ProgramFault)),
-    *(one.__name__ for one in (OtherSurfaceError, UnusableMeshError)),
+    *(one.__name__ for one in (OtherSurfaceError, RepairLossError, UnusableMeshError)),
 }
 
 
@@ -80,7 +80,7 @@ def test_the_page_of_the_commands_has_every_verb_and_option(monkeypatch):
         for option in verb.params:
             for flag in option.opts if option.param_type_name == "option" else ():
                 assert f"`{flag}" in sections[name], f"{flag} of {name}"
-    assert "| `--uv unit\\|disk` |" in sections["map"]
+    assert "| `--uv unit\\|square\\|world\\|disk` |" in sections["map"]
     assert "$ cembench map left-hand" in sections["map"]
     assert "Default: `reuse`." in sections["run"]
     assert set(re.findall(r"`cembench ([a-z]+)", page)) <= set(verbs)

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from cembench.algorithms.direct_cem.holes import direct_cem_holes
-from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import DiskMesh, HoledMesh, MeshError, ParameterError, TriangleMesh
 from cembench.conformal.metrics import all_metrics
@@ -24,7 +23,7 @@ def without(F, *triangles):
 def test_a_fin_comes_off_and_the_sheet_stays_whole():
     V, F = gallery.flat_rectangle()
     fin = np.vstack([[[14, 15, 30]], F])
-    repaired = repair(np.vstack([V, [[2.5, 2, 1]]]), fin)
+    repaired = repair(np.vstack([V, [[2.5, 2, 1]]]), fin, drop=True)
     mesh = DiskMesh.from_arrays(*repaired.surfaces[0])
     assert repaired.steps[Step.edges] == 1
     assert repaired.steps[Step.component_faces] == 1
@@ -45,7 +44,7 @@ def test_two_sheets_that_cross_come_apart_along_the_crossing():
 def test_a_wall_inside_a_closed_surface_comes_out():
     V, F = gallery.tetrahedron()
     inside = np.vstack([V, V[1:].mean(axis=0)[None]])
-    repaired = repair(inside, np.vstack([F, [[1, 2, 4]]]))
+    repaired = repair(inside, np.vstack([F, [[1, 2, 4]]]), drop=True)
     assert repaired.steps[Step.edges] == 1
     assert len(repaired.surfaces[0][1]) == 4
 
@@ -103,17 +102,40 @@ def test_a_one_sided_surface_is_cut_into_a_disk():
     DiskMesh.from_arrays(*repaired.surfaces[0])
 
 
-def test_ears_are_dropped_one_after_the_other_but_not_a_whole_strip():
-    V, F = gallery.flat_rectangle(1, 6)
-    assert len(repair(V, F).surfaces[0][1]) == len(F)
-    hill = spherical_cap(300)
-    a, b = hill.boundary[:2].tolist()
-    n = hill.n
-    chain = np.vstack([hill.F, [[b, a, n], [b, n, n + 1]]])
-    points = np.vstack([hill.V, 1.3 * hill.V[a], 1.3 * hill.V[b]])
-    repaired = repair(points, chain)
+def with_a_chain_of_ears(rows, loop):
+    """A square with a hole, and two triangles that hang on one of its boundaries, one by one."""
+    V, F = gallery.flat_rectangle(rows, rows)
+    middle = (V[F].mean(axis=1) - rows / 2) ** 2
+    F = F[middle[:, :2].max(axis=1) > 4]
+    used, F = np.unique(F, return_inverse=True)
+    V, F = V[used], F.reshape(-1, 3)
+    mesh = HoledMesh.from_arrays(V, F)
+    a, b = mesh.loops[loop][1:3].tolist()
+    n, inwards = len(V), 0.2 if loop else -0.2
+    tips = [V[k] + inwards * (rows / 2 - V[k]) * [1, 1, 0] for k in (a, b)]
+    return mesh, np.vstack([V, *tips]), np.vstack([F, [[b, a, n], [b, n, n + 1]]])
+
+
+def test_ears_of_holes_are_dropped_one_after_the_other():
+    mesh, V, F = with_a_chain_of_ears(24, 1)
+    repaired = repair(V, F)
     assert repaired.steps[Step.ears] == 2
-    assert len(repaired.surfaces[0][1]) == hill.m
+    assert len(repaired.surfaces[0][1]) == mesh.m
+
+
+@pytest.mark.parametrize(("rows", "loop"), [(24, 0), (6, 1)])
+def test_ears_stay_at_the_outer_boundary_and_where_they_are_much_of_the_surface(rows, loop):
+    _, V, F = with_a_chain_of_ears(rows, loop)
+    repaired = repair(V, F)
+    assert repaired.steps[Step.ears] == 0
+    assert len(repaired.surfaces[0][1]) == len(F)
+
+
+def test_the_corners_of_a_grid_stay():
+    V, F = gallery.flat_rectangle(4, 6)
+    repaired = repair(np.vstack([V, [[9, 9, 9]]]), F)
+    assert steps_taken(repaired) == {Step.isolated: 1}
+    assert len(repaired.surfaces[0][1]) == len(F)
 
 
 def test_small_holes_are_filled_and_the_longest_loop_stays():
@@ -137,7 +159,7 @@ def test_components_are_surfaces_of_their_own_the_largest_first():
     small, G = gallery.tetrahedron()
     both = repair(np.vstack([small, V + 9]), np.vstack([G, F + 4]), components="all")
     assert [len(f) for _, f in both.surfaces] == [len(F), 4]
-    one = repair(np.vstack([small, V + 9]), np.vstack([G, F + 4]))
+    one = repair(np.vstack([small, V + 9]), np.vstack([G, F + 4]), drop=True)
     assert [len(f) for _, f in one.surfaces] == [len(F)]
     assert one.steps[Step.components] == 1
     assert one.steps[Step.component_faces] == 4
@@ -151,7 +173,7 @@ def test_any_soup_becomes_manifolds(seed):
     V = rng.integers(0, 3, (n, 3)).astype(float)
     F = rng.integers(-1, n + 1, (int(rng.integers(1, 60)), 3))
     try:
-        repaired = repair(V, F, components="all", fill_holes=int(rng.integers(0, 8)))
+        repaired = repair(V, F, components="all", fill_holes=int(rng.integers(0, 8)), drop=True)
     except MeshError:
         inside = F[((F >= 0) & (n > F)).all(axis=1)]
         assert degenerate(V, inside).all()

@@ -97,7 +97,7 @@ def test_every_kind_of_defect_is_among_them():
     assert seen == set(Defect) - {Defect.no_hole}
 
 
-def followed(remedy, V, F, problems):
+def followed(remedy, V, F, problems, options):
     """The surface after the advice of an error was followed."""
     if remedy is Remedy.rescale:
         return rescaled(V), F
@@ -105,7 +105,7 @@ def followed(remedy, V, F, problems):
         disk = cut_open(TriangleMesh.from_arrays(V, F)).mesh
         return disk.V, disk.F
     edges = max(p.edges for p in problems) if remedy is Remedy.fill else 0
-    return repair(V, F, fill_holes=edges).surfaces[0]
+    return repair(V, F, fill_holes=edges, **options).surfaces[0]
 
 
 @pytest.mark.parametrize(("V", "F"), [case[1] for case in defective()], ids=dict(defective()))
@@ -121,4 +121,4 @@ def test_the_advice_of_every_error_leads_to_a_disk_and_never_back(V, F):
             remedy = next(one for one in order if one in advice)
             assert remedy not in taken
             taken.append(remedy)
-            V, F = followed(remedy, V, F, error.problems)
+            V, F = followed(remedy, V, F, error.problems, error.options)

@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable
 from contextlib import suppress
 from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -34,14 +35,15 @@ _SOUP, _ERROR = "soup.npz", "error.txt"
 _NO_MEMORY = 12
 
 
-def apart(reader: Reader, extra: Extra, module: str) -> Reader:
+def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
     """Return a reader that calls this one in another process; its library is of an extra.
 
-    The reader raises :class:`MissingExtra` where the library is not installed.
+    The reader raises :class:`MissingExtra` where neither it nor the other library is installed.
     """
 
     def read(path: Path) -> Soup:
-        require(extra, f"reading {path.suffix} files", module)
+        if not other or find_spec(other) is None:
+            require(extra, f"reading {path.suffix} files", module)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
             reads = [reader.__module__, reader.__name__, str(path.absolute()), name]

@@ -1,4 +1,4 @@
-"""GIFTI surfaces (`.gii`), used in brain imaging, read through nibabel."""
+"""Surfaces of brain imaging, read through nibabel: GIFTI (`.gii`) and FreeSurfer geometry."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ def read(path: Path) -> Soup:
         V, F = ([np.asarray(one.data) for one in arrays] for arrays in (points, triangles))
     except MemoryError:
         raise
-    except Exception as error:  # whatever a library raises on damaged bytes
-        raise damaged(f"it cannot be read as GIFTI: {type(error).__name__}: {error}") from None
+    except Exception:  # whatever a library raises on damaged bytes
+        raise damaged("it cannot be read as GIFTI") from None
     if len(V) != 1 or len(F) != 1:
         raise MeshError(
             f"it holds {len(V)} sets of points and {len(F)} of triangles; one of each is needed. "
@@ -33,3 +33,16 @@ def read(path: Path) -> Soup:
     if V[0].ndim != 2 or V[0].shape[1] != 3 or F[0].ndim != 2 or F[0].shape[1] != 3:
         raise damaged(f"its points have shape {V[0].shape} and its triangles {F[0].shape}")
     return Soup.from_arrays(V[0], F[0], np.full(len(F[0]), 3))
+
+
+def read_freesurfer(path: Path) -> Soup:
+    """Read a geometry file of FreeSurfer, such as `lh.pial`, of triangles or quadrangles."""
+    nibabel: Any = importlib.import_module("nibabel")
+
+    try:
+        V, F = nibabel.freesurfer.read_geometry(path)
+    except MemoryError:
+        raise
+    except Exception:  # whatever a library raises on damaged bytes
+        raise damaged("it cannot be read as FreeSurfer geometry") from None
+    return Soup.from_arrays(V, F, np.full(len(F), 3))

@@ -35,8 +35,8 @@ def read(path: Path) -> Soup:
         pieces = scene.dump()
     except MemoryError:
         raise
-    except Exception as error:  # whatever a library raises on damaged bytes
-        raise damaged(f"it cannot be read as glTF: {type(error).__name__}: {error}") from None
+    except Exception:  # whatever a library raises on damaged bytes
+        raise damaged(f"it cannot be read as {path.suffix[1:].upper()}") from None
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
     notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):

@@ -157,8 +157,8 @@ def _inflated(element: bytes, most: int) -> tuple[bytes, bool]:
     stream = zlib.decompressobj()
     try:
         return stream.decompress(element, most), stream.eof
-    except zlib.error as error:
-        raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+    except zlib.error:
+        raise damaged("it cannot be read as MAT: damaged compression") from None
 
 
 def _inflated_whole(element: bytes, size: int) -> bytes:
@@ -178,8 +178,8 @@ def _check_compressed(element: bytes, size: int) -> None:
     while rest and length <= size:
         try:
             length += len(stream.decompress(rest, 2**20))
-        except zlib.error as error:
-            raise damaged(f"it cannot be read as MAT: damaged compression ({error})") from None
+        except zlib.error:
+            raise damaged("it cannot be read as MAT: damaged compression") from None
         rest = stream.unconsumed_tail
     if length != size or not stream.eof:
         raise damaged("it cannot be read as MAT: a compressed element was cut short")

@@ -26,10 +26,11 @@ from cembench.mesh.soup import (
     Indices,
     Soup,
     complex_of,
-    damaged,
     numbers_of,
     refuse_underscores,
     shown,
+    to_number,
+    unreadable,
     words_of,
 )
 
@@ -121,7 +122,7 @@ def _read_statements(path: Path, *, uv: bool) -> Soup:
                 elif words[0] and words[0] not in _SKIPPED:
                     unknown.append(f"line {number}, {shown(line)}")
             except (ValueError, OverflowError) as error:
-                raise damaged(f"line {number}, {shown(line)}: {error}") from None
+                raise unreadable(f"line {number}", line, error) from None
     more = {"uv": complex_of(texture), "uv_index": np.asarray(uv_index)} if uv else {}
     return Soup.from_arrays(
         coordinates, corners, sizes, counted_from=1, notices=_unknown_notice(unknown), **more
@@ -153,7 +154,7 @@ def _whole_statement(line: str, lines: Iterator[tuple[int, str]]) -> list[str]:
 
 def _point(words: list[str]) -> list[float]:
     """Return the three coordinates; a weight or a colour may follow them."""
-    numbers = [float(word) for word in words[1:]]
+    numbers = [to_number(float, word) for word in words[1:]]
     if len(numbers) < 3:
         raise ValueError(f"a vertex needs 3 numbers, but this one has {len(numbers)}")
     refuse_underscores(words)
@@ -171,7 +172,7 @@ def _texture_coordinate(words: list[str]) -> list[float]:
 
 def _face(words: list[str], vertices: int) -> list[int]:
     """Return vertex indices, counted from 1; negative ones count back from the latest vertex."""
-    face = [int(word.split("/", 1)[0]) for word in words[1:]]
+    face = [to_number(int, word.split("/", 1)[0]) for word in words[1:]]
     if len(face) < 3:
         raise ValueError(f"a face needs 3 corners, but this one has {len(face)}")
     refuse_underscores(words)
@@ -188,7 +189,7 @@ def _face(words: list[str], vertices: int) -> list[int]:
 def _uv_indices(words: list[str], count: int) -> list[int]:
     """Return the texture coordinates of a face's corners, counted from 0."""
     named = [[*word.split("/"), ""][1] for word in words[1:]]
-    return [_from_0(int(k), count) if k else NO_UV for k in named]
+    return [_from_0(to_number(int, k), count) if k else NO_UV for k in named]
 
 
 def _from_0(index: int, count: int) -> int:

@@ -20,6 +20,8 @@ from cembench.mesh.soup import (
     damaged,
     refuse_underscores,
     shown,
+    to_number,
+    unreadable,
     words_of,
 )
 
@@ -114,12 +116,12 @@ def _declared(lines: _Lines) -> tuple[int, int, bool]:
 def _numbers(kind: type[M], number: int, words: list[str], count: int) -> list[M]:
     """Return the first `count` numbers of a line; the rest, e.g. a colour, must be numbers too."""
     try:
-        numbers = [kind(word) for word in words[:count]]
+        numbers = [to_number(kind, word) for word in words[:count]]
         for word in words[count:]:
-            float(word)
+            to_number(float, word)
         refuse_underscores(words)
     except ValueError as error:
-        raise damaged(f"line {number}, {shown(' '.join(words))}: {error}") from None
+        raise unreadable(f"line {number}", " ".join(words), error) from None
     if len(numbers) < count:
         raise damaged(
             f"line {number}, {shown(' '.join(words))}: {count} numbers are needed, but "

@@ -28,8 +28,10 @@ from cembench.mesh.soup import (
     complex_of,
     damaged,
     in_single_precision,
+    no_faces,
     numbers_of,
     shown,
+    unreadable,
 )
 
 #: A header must end within this many bytes.
@@ -236,6 +238,8 @@ def _element(elements: list[_Element], name: str) -> _Element:
         if element.name == name:
             return element
     present = ", ".join(element.name for element in elements) or "none"
+    if name == "face" and present == "vertex":
+        raise no_faces(elements[0].count)
     raise damaged(f"there is no element {name!r}; the header declares: {present}")
 
 
@@ -265,7 +269,8 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
     for number, line in enumerate(body.tobytes().decode("latin-1").splitlines(), header_lines + 1):
         for word in line.split():
             if not _is_number(word):
-                raise damaged(f"line {number}, {shown(line)}: {shown(word)} is not a number")
+                error = ValueError(f"{shown(word)} is not a number")
+                raise unreadable(f"line {number}", line, error)
     raise damaged("the body holds a word that is not a number")
 
 

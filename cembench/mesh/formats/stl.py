@@ -20,6 +20,7 @@ from cembench.mesh.soup import (
     in_single_precision,
     refuse_underscores,
     shown,
+    unreadable,
     words_of,
 )
 
@@ -85,7 +86,8 @@ def _point(number: int, line: str, words: list[str]) -> list[float]:
         refuse_underscores(words)
         x, y, z = map(float, words)
     except ValueError:
-        raise damaged(f"line {number}, {shown(line)}: a vertex needs 3 numbers") from None
+        error = ValueError("a vertex needs 3 numbers")
+        raise unreadable(f"line {number}", line.strip(), error) from None
     return [x, y, z]
 
 

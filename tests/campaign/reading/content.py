@@ -28,8 +28,18 @@ class Content:
         """How many triangles the polygons make: k - 2 for one of k corners."""
         return sum(len(polygon) - 2 for polygon in self.polygons)
 
-    def checked(self) -> Content:
-        """Return this content, or raise where a polygon cannot be one."""
+    def used(self) -> Content:
+        """Return this content without the points of no polygon."""
+        numbers = sorted({k for polygon in self.polygons for k in polygon})
+        place = {number: k for k, number in enumerate(numbers)}
+        polygons = [tuple(place[k] for k in polygon) for polygon in self.polygons]
+        return Content([self.points[k] for k in numbers], polygons)
+
+    def checked(self, *, lines: bool = False) -> Content:
+        """Return this content, or raise where a polygon cannot be one. `lines` may be there."""
+        polygons = [polygon for polygon in self.polygons if len(polygon) != 2 or not lines]
+        if polygons and len(polygons) < len(self.polygons):
+            return Content(self.points, polygons).checked()
         for number, polygon in enumerate(self.polygons):
             if len(polygon) < 3:
                 raise Damaged(f"face {number} has {len(polygon)} corners")

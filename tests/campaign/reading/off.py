@@ -41,7 +41,7 @@ def read_off(data: bytes) -> Content:
         points.append(tuple(real(word) for word in words[:3]))
         for word in words[3:]:
             unread(word)
-    return Content(points, [_face(words) for words in lines[vertices:]]).checked()
+    return Content(points, [_face(words) for words in lines[vertices:]]).checked(lines=True)
 
 
 def _face(words: list[str]) -> tuple[int, ...]:

@@ -66,7 +66,7 @@ def read_ply(data: bytes) -> Content:
         if not isinstance(corners, tuple) or any(isinstance(k, float) for k in corners):
             raise Damaged("a face without a list of vertex indices")
         polygons.append(tuple(int(k) for k in corners))
-    return Content(points, polygons).checked()
+    return Content(points, polygons).checked(lines=True)
 
 
 Row = dict[str, Value | tuple[Value, ...]]
