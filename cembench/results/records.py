@@ -147,6 +147,8 @@ class FaultKind(StrEnum):
     BOUNDARY_ORDER = "boundary_order"
     BOUNDARIES_CROSS = "boundaries_cross"
     HOLE_ORIENTATION = "hole_orientation"
+    #: A hole is no circle, or its circle meets another one or leaves the disk.
+    HOLES_NOT_CIRCULAR = "holes_not_circular"
     REVERSED = "reversed"
     FOLDED = "folded"
     #: No metrics can be computed from the map.

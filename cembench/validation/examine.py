@@ -45,9 +45,14 @@ from cembench.validation.solver import Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Default baseline for each target.
-_USUAL_BASELINE = {"disk": "cem", "free boundary": "lscm", "circular holes": "koebe-cem"}
+_USUAL_BASELINE = {
+    "disk": "cem",
+    "free boundary": "lscm",
+    "circular holes": "koebe-cem",
+    "disk with holes": "harmonic-filled",
+}
 #: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
-_GROWTH_REFERENCE = {"disk": "cem", "free boundary": "lscm", "circular holes": "direct-cem-holes"}
+_GROWTH_REFERENCE = _USUAL_BASELINE | {"circular holes": "direct-cem-holes"}
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,10 @@ from typing import Annotated
 
 import numpy as np
 from cembench.algorithms.cem import cem
+from cembench.algorithms.harmonic_filled import harmonic_filled
 from pydantic import Field
 
-from cembench import AlgorithmFailed, DiskMesh, Parameterization, algorithm
+from cembench import AlgorithmFailed, DiskMesh, HoledMesh, Parameterization, algorithm
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import signed_areas
@@ -25,6 +26,11 @@ def harmonic(mesh, f_b):
 @algorithm("right", title="Right", target="disk")
 def right_one(mesh: DiskMesh) -> Parameterization:
     return cem(mesh)
+
+
+@algorithm("not-round", title="Leaves holes as they come", target="circular holes")
+def not_round(mesh: HoledMesh) -> Parameterization:
+    return harmonic_filled(mesh)
 
 
 @algorithm("not-combinatorial", title="Declares what is not so", target="disk", combinatorial=True)
