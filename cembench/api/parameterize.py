@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from cembench.api.map_files import algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
-from cembench.api.settings import Placement
+from cembench.api.settings import Placement, Threads
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
@@ -25,6 +25,7 @@ from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
+from cembench.running.in_this_process import numerical_threads
 from cembench.running.map_checks import figures
 from cembench.running.measure import check_cell, check_overlay, refinement_of
 from cembench.running.plan import MeasurementSettings, cell_of, distribute_parameters
@@ -390,6 +391,7 @@ def parameterize(
     keep_invalid: bool = False,
     check: Check = "full",
     overlay: bool = False,
+    threads: Threads = 1,
     plugins: Iterable[str] = (),
     **parameters: Any,
 ) -> Result:
@@ -415,6 +417,9 @@ def parameterize(
         Whether the map is on a refinement of the surface, without folds by construction; then
         :attr:`Result.mesh` is that. ``"cetm-flips"`` has it: the mesh cut along the edges of the
         flipped triangulation.
+    threads : int
+        Threads of the numerical libraries. As everywhere in this package, one by default, whatever
+        the environment says: the last digits of a map depend on their number.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters
@@ -464,13 +469,15 @@ def parameterize(
     mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     arguments = distribute_parameters([chosen], parameters)[chosen.name]
-    cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))
+    settings = MeasurementSettings(repeats=1, threads=threads)
+    cell = cell_of(chosen, mesh, arguments, settings, sources_of(chosen))
     full = check == "full"
-    if overlay:
-        refinement_of(chosen)
-        outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)
-    else:
-        outcome, z = check_cell(chosen, mesh, cell, memory=False, figures=full)
+    with numerical_threads(threads):
+        if overlay:
+            refinement_of(chosen)
+            outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)
+        else:
+            outcome, z = check_cell(chosen, mesh, cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)

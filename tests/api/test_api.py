@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from threadpoolctl import threadpool_limits
 
 import cembench
 from cembench import HoledMaps
@@ -297,3 +298,11 @@ def test_a_map_of_a_surface_with_holes_that_failed_has_its_cause():
         result["koebe-cem"]
     with pytest.raises(KeyError):
         result["lscm"]
+
+
+def test_a_map_does_not_depend_on_the_threads_of_the_process(disk):
+    maps = []
+    for count in (1, 2):
+        with threadpool_limits(limits=count):
+            maps.append(cembench.parameterize(disk, "direct-cem").z)
+    np.testing.assert_array_equal(*maps)
