@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cembench.core.parameterization import Parameterization
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import algorithm
 
 from .constraints import Angles, kept_positive, placed
@@ -33,6 +33,11 @@ def abf_linear(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     logarithm) are what remains of the constraints, since the step is linear. Folds inside are
     repaired as in LSCM (`fold_repairs`).
     """
+    return linear_angles(mesh, repair=repair)
+
+
+def linear_angles(mesh: DiskMesh | HoledMesh, *, repair: bool = True) -> Parameterization:
+    """Return the map of :func:`abf_linear`, with the boundaries of holes free too."""
     problem = Angles(mesh)
     wanted = problem.wanted
     e, _ = problem.step(wanted, wanted**2, np.zeros_like(wanted))

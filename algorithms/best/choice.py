@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from cembench.conformal.angle_gauge import EQUAL
-from cembench.conformal.metrics import CIRCULAR, MapFigures, boundary_circularity, flipped_triangles
+from cembench.conformal.metrics import MapFigures, flipped_triangles
+from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import texel_density_ratio
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
-from cembench.mesh.triangle_mesh import HoledMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import TriangleMesh
 
+Complex = NDArray[np.complex128]
 M = TypeVar("M", bound=TriangleMesh)
 
+#: A mean angle error, in degrees, above which a later tier may be better.
+POOR = 10.0
 #: The usual limit of `work`: about a minute.
 USUAL_WORK = 2e7
 
@@ -37,21 +44,39 @@ class Candidate:
 
 
 def best_of(
-    mesh: M, candidates: Mapping[str, Candidate], work: float, **given: Any
+    mesh: M,
+    tiers: Sequence[Mapping[str, Candidate]],
+    work: float,
+    flaw: Callable[[M, Complex], str] = lambda mesh, z: "",
+    **given: Any,
 ) -> Parameterization:
     """Return the valid map with the smallest mean angle error; of equal ones the most even in area.
 
     Errors within 1 % of the smallest are equal. Where no map is valid, those with the fewest folds
-    count, and of these those with round holes. Candidates are tried in their order. One is left out
-    if the triangles of the surface times the costs up to it exceed `work`; the first never is. So
-    the choice depends on the surface alone. `given` are parameters of all candidates.
+    count. Candidates are tried in their order, those of a later tier only if no map of an earlier
+    one is valid with an error of at most 10 degrees. One is left out if the triangles of the
+    surface times the costs of its tier up to it exceed `work`; the first of a tier never is. So the
+    choice depends on the surface alone.
+
+    Parameters
+    ----------
+    mesh : TriangleMesh
+        The surface.
+    tiers : sequence of mappings
+        Candidates by name.
+    work : float
+        The limit, in triangles that a candidate of cost 1 maps.
+    flaw : function
+        Returns why a map without folds is not valid; "" if it is.
+    **given
+        Parameters of all candidates.
 
     Returns
     -------
     Parameterization
         The map, with the iterations, energies and extras of the chosen algorithm. In its extras,
         ``chosen`` is that algorithm's name, and ``tried`` has, for each, ``angle_error_mean_deg``
-        and ``texel_density_ratio``, or why there is no map to compare.
+        and ``texel_density_ratio``, or why there is no valid map.
 
     Raises
     ------
@@ -59,26 +84,29 @@ def best_of(
         No candidate has a map.
 
     """
+    surface = MapFigures(mesh, np.zeros(mesh.n, dtype=np.complex128))
     tried: dict[str, dict[str, float] | str] = {}
     maps: list[tuple[tuple[int, bool], float, float, str, Parameterization]] = []
-    spent = 0.0
-    for name, one in candidates.items():
-        spent += one.cost * mesh.m
-        if tried and spent > work:
-            tried[name] = f"not tried: on {mesh.m:,} triangles it needs work={spent:.2g}"
-            continue
-        try:
-            made = one.call(mesh, **given)
-        except AlgorithmFailed as error:
-            tried[name] = str(error)
-            continue
-        faults = flipped_triangles(mesh, made.uv), not _has_round_holes(mesh, made)
-        figures = MapFigures(mesh, made.uv)
-        off = float(figures.angle_errors.mean())
-        ratio = texel_density_ratio(figures.areas, figures.image_areas)
-        known = {"angle_error_mean_deg": off, "texel_density_ratio": ratio}
-        tried[name] = known if faults == (0, False) else _words(*faults)
-        maps.append((faults, off, ratio, name, made))
+    for tier in tiers:
+        spent, first = 0.0, next(iter(tier))
+        for name, one in tier.items():
+            spent += one.cost * mesh.m
+            if name != first and spent > work:
+                tried[name] = f"not tried: on {mesh.m:,} triangles it needs work={spent:.2g}"
+                continue
+            try:
+                made = one.call(mesh, **given)
+            except AlgorithmFailed as error:
+                tried[name] = str(error)
+                continue
+            folds = flipped_triangles(mesh, made.uv)
+            why = f"{folds:,} folds" if folds else flaw(mesh, made.uv)
+            off = float(surface.angle_errors_of(made.uv).mean())
+            ratio = texel_density_ratio(surface.areas, signed_areas(made.uv, mesh.F))
+            tried[name] = why or {"angle_error_mean_deg": off, "texel_density_ratio": ratio}
+            maps.append(((folds, bool(why)), off, ratio, name, made))
+        if any(not why and off <= POOR for (_, why), off, *_ in maps):
+            break
     if not maps:
         causes = "; ".join(f"{name}: {why}" for name, why in tried.items())
         raise AlgorithmFailed(f"no algorithm has a map ({causes})")
@@ -86,12 +114,3 @@ def best_of(
     equal = [one for one in maps if one[0] == fewest and one[1] <= (1 + EQUAL) * least]
     *_, name, made = min(equal, key=lambda one: one[2])
     return replace(made, extras=made.extras | {"chosen": name, "tried": tried})
-
-
-def _has_round_holes(mesh: TriangleMesh, made: Parameterization) -> bool:
-    """Whether holes are circles as "circular holes" promises; True for a disk."""
-    return not isinstance(mesh, HoledMesh) or boundary_circularity(mesh, made.uv) <= CIRCULAR
-
-
-def _words(folds: int, unround: bool) -> str:
-    return f"{folds:,} folds" if folds else "holes that are not round"

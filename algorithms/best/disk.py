@@ -58,7 +58,7 @@ def best(
     same surface always has the same map. `chosen` names the algorithm, `tried` has the mean angle
     error, in degrees, and the texel density ratio of each, before all this.
     """
-    chosen = best_of(mesh, CANDIDATES, work, repair=repair)
+    chosen = best_of(mesh, [CANDIDATES], work, repair=repair)
     most = min(MOST_STEPS, int(work / (STEP * mesh.m)))
     uv, steps = evened(mesh, angle_gauge(mesh, chosen.uv), most)
     return replace(chosen, uv=uv, extras=chosen.extras | {"even_steps": steps})

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.conformal.metrics import CIRCULAR, boundary_circularity
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import algorithm
@@ -39,4 +42,8 @@ def best_holes(
 
     `outer`, `work`, `chosen` and `tried` are as in direct-cem-holes and best.
     """
-    return best_of(mesh, CANDIDATES, work, outer=outer, repair=repair)
+    return best_of(mesh, [CANDIDATES], work, _flaw, outer=outer, repair=repair)
+
+
+def _flaw(mesh: HoledMesh, z: NDArray[np.complex128]) -> str:
+    return "" if boundary_circularity(mesh, z) <= CIRCULAR else "holes that are not round"

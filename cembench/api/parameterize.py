@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.api.map_files import algorithms_named
+from cembench.api.map_files import MapTarget, algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
 from cembench.api.settings import Placement, Threads
 from cembench.core.arguments import checked
@@ -198,7 +198,8 @@ class Result:
         Examples
         --------
         >>> import cembench
-        >>> result = cembench.parameterize(cembench.surface("hemi-ellipsoid", 2000))
+        >>> mesh = cembench.surface("hemi-ellipsoid", 2000)
+        >>> result = cembench.parameterize(mesh, target="disk")
         >>> proof = result.certificate()
         >>> proof.encloses(result.z[proof.corners])
         True
@@ -210,7 +211,7 @@ class Result:
         if certificate is None:
             raise ParameterError(
                 f"{self.algorithm.name} on {self.mesh.name} is no map to the disk, whose modulus "
-                "is known. Take an algorithm for disks, or for holes."
+                'is known. Take target="disk".'
             )
         return certificate
 
@@ -388,6 +389,7 @@ def parameterize(
     surface: SurfaceInput | ArrayLike,
     *faces_and_algorithm: ArrayLike | str,
     algorithm: str | None = None,
+    target: MapTarget | None = None,
     keep_invalid: bool = False,
     check: Check = "full",
     overlay: bool = False,
@@ -405,8 +407,11 @@ def parameterize(
     *faces_and_algorithm
         F, if `surface` is V; then the name of the algorithm, unless it is given by keyword.
     algorithm : str, optional
-        A name from :func:`cembench.list_algorithms`; default: ``"direct-cem"``, or
-        ``"direct-cem-holes"`` for surfaces with holes.
+        A name from :func:`cembench.list_algorithms`, instead of a `target`.
+    target : {"plane", "disk", "circular holes"}, optional
+        Take the recommended map to the plane, with a free boundary and the least angle errors
+        (``"plane"``, the default); to the disk, with round holes if there are any
+        (``"direct-cem"`` or ``"direct-cem-holes"``); or to the disk with round holes alone.
     keep_invalid : bool
         Whether to return an invalid map (for example, one with folds) instead of raising; see
         :attr:`Result.ok`.
@@ -437,8 +442,8 @@ def parameterize(
     RegistryError
         The algorithm is unknown.
     ParameterError
-        A parameter or a check is unknown, a value is out of range, two algorithms are named, or
-        there is no `overlay` of the algorithm.
+        A parameter, a check or a target is unknown, a value is out of range, two algorithms or an
+        algorithm and a target are named, or there is no `overlay` of the algorithm.
     AlgorithmFailed
         No map was found, or the map is not valid and `keep_invalid` is False.
 
@@ -464,7 +469,7 @@ def parameterize(
         raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
     what: Any = (surface, *arrays) if arrays else surface
     registry = load_registry(plugins)
-    names = algorithms_named(named[0] if named else None)
+    names = algorithms_named(named[0] if named else None, target)
     candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))

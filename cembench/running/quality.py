@@ -89,6 +89,12 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
 
 def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) -> list[Notice]:
     """Return a remark on what a method's last resort did, and what that cost."""
+    if wanted := extras.get("instead_of"):
+        tried = {name: why for name, why in extras["tried"].items() if name != extras["chosen"]}
+        causes = "; ".join(f"{name}: {_why_not(why)}" for name, why in tried.items())
+        chosen = extras["chosen"]
+        message = f"{wanted} is not valid here, or worse ({causes}), so this is that of {chosen}"
+        return [Notice(NoticeKind.LAST_RESORT, message)]
     done = extras.get("last_resort")
     if not done:
         return []
@@ -116,6 +122,11 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
             "e.g. -a abf-linear"
         )
     return [Notice(NoticeKind.LAST_RESORT, message)]
+
+
+def _why_not(tried: Any) -> str:
+    """Return what an algorithm that chooses says of a map that it did not choose."""
+    return tried if isinstance(tried, str) else f"{tried['angle_error_mean_deg']:.2f} degrees"
 
 
 def better_parameters(

@@ -73,7 +73,7 @@ FAILS = of(None, "it gave up")
 def test_failures_and_folds_are_passed_over():
     mesh = cembench.surface("flat-disk", 200)
     ways = {"fails": FAILS, "folded": FOLDED, "stretched": STRETCHED, "flat": FLAT}
-    result = best_of(mesh, {name: Candidate(way) for name, way in ways.items()}, 1e6)
+    result = best_of(mesh, [{name: Candidate(way) for name, way in ways.items()}], 1e6)
     assert result.extras["chosen"] == "flat"
     tried = result.extras["tried"]
     assert tried["fails"] == "it gave up"
@@ -85,7 +85,7 @@ def test_of_equal_angles_the_more_even_area_wins():
     mesh = cembench.surface("flat-disk", 5000)
     uneven = of(lambda mesh: (z := mesh.V[:, 0] + 2j * mesh.V[:, 1]) + 0.2 * z**2)
     even = of(lambda mesh: mesh.V[:, 0] + 2.01j * mesh.V[:, 1])
-    result = best_of(mesh, {"uneven": Candidate(uneven), "even": Candidate(even)}, 1e6)
+    result = best_of(mesh, [{"uneven": Candidate(uneven), "even": Candidate(even)}], 1e6)
     assert result.extras["chosen"] == "even"
     errors = errors_of(result)
     assert errors[0] < errors[1] < 1.01 * errors[0]
@@ -110,7 +110,7 @@ def test_no_algorithm_reads_a_clock():
 def test_what_may_take_too_long_is_left_out_by_the_size_of_the_surface():
     mesh = cembench.surface("flat-disk", 200)
     ways = {"stretched": Candidate(STRETCHED), "flat": Candidate(FLAT, cost=1e12)}
-    result = best_of(mesh, ways, 1e9)
+    result = best_of(mesh, [ways], 1e9)
     assert result.extras["chosen"] == "stretched"
     assert "not tried" in result.extras["tried"]["flat"]
 
@@ -118,9 +118,9 @@ def test_what_may_take_too_long_is_left_out_by_the_size_of_the_surface():
 def test_without_a_map_every_cause_is_named_and_a_folded_one_is_left_to_the_judge():
     mesh = cembench.surface("flat-disk", 200)
     with pytest.raises(AlgorithmFailed) as failed:
-        best_of(mesh, {"fails": Candidate(FAILS), "too": Candidate(FAILS)}, 1e6)
+        best_of(mesh, [{"fails": Candidate(FAILS), "too": Candidate(FAILS)}], 1e6)
     assert "fails: it gave up; too: it gave up" in str(failed.value)
-    result = best_of(mesh, {"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}, 1e6)
+    result = best_of(mesh, [{"fails": Candidate(FAILS), "folded": Candidate(FOLDED)}], 1e6)
     assert result.extras["chosen"] == "folded"
 
 
