@@ -98,7 +98,11 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
     if "texel_density_ratio" not in metrics:
         return ""
     ratio, share = metrics["texel_density_ratio"], metrics["undersampled_share"] or 0.0
-    words = "texel density has no bound" if ratio is None else f"texel density varies {_of(ratio)}"
+    words = (
+        "texel density has no bound"
+        if ratio is None
+        else f"texel density varies {density_words(ratio)}"
+    )
     if not share:
         return words
     part = f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
@@ -106,7 +110,8 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
     return f"{words}; at {SIDE:,} px, {lacking}"
 
 
-def _of(ratio: float) -> str:
+def density_words(ratio: float) -> str:
+    """Return a ratio of densities with two digits or none after the point."""
     return f"{ratio:,.0f} : 1" if 10 <= ratio < 1e6 else f"{ratio:.2g} : 1"
 
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
+from cembench.conformal.texel_density import (
+    ISLANDS,
+    density_words,
+    needs_islands,
+    texture_words,
+)
 from cembench.report.declarations import own
 from cembench.report.document import Column, Table
 from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
@@ -61,7 +66,7 @@ def _compared(one: Any) -> str:
     """Return the figures of a map that was compared, or "none"; records before them have errors."""
     if not isinstance(one, Mapping):
         return f"{one:.2f}" if isinstance(one, float) else "none"
-    return f"{one['angle_error_mean_deg']:.2f} ({one['texel_density_ratio']:.2g} : 1)"
+    return f"{one['angle_error_mean_deg']:.2f} ({density_words(one['texel_density_ratio'])})"
 
 
 def _metrics(record: Record) -> Iterator[tuple[str, str]]:
