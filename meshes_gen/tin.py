@@ -26,7 +26,7 @@ ON_LINES, APART = 0.6, 0.02
 #: Powers of ten of the smallest and largest distance of twins, over that of points.
 NEAREST, FARTHEST = -5.0, -1.0
 #: Height of the step at a breakline, over the relief.
-STEP = 0.1
+STEP = 0.003
 
 
 @surface_family("tin", title="Survey TIN", source="random points, breaklines and needles")
