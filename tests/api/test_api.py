@@ -274,7 +274,7 @@ def test_a_map_is_compared_with_the_bounds_of_the_modulus():
     good = cembench.parameterize(cembench.surface("hemi-ellipsoid", 2000), target="disk")
     proof = good.certificate()
     assert proof.words(good.z[proof.corners]).endswith("within")
-    assert proof.words(np.exp([0, 2j, 3j, 4j])).endswith("outside")
+    assert "times that" in proof.words(np.exp([0, 2j, 3j, 4j]))
     assert "not in order" in proof.words(good.z[proof.corners[::-1]])
     free = cembench.parameterize(good.mesh, "lscm")
     with pytest.raises(cembench.ParameterError, match="no map to the disk"):
