@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.free_boundary import with_area_pi
 from cembench.conformal.planar import crossing_polygons
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -25,7 +26,7 @@ from ..scp import scp
 from .choice import Candidate, best_of
 
 Complex = NDArray[np.complex128]
-M = TypeVar("M", bound=TriangleMesh)
+M = TypeVar("M", DiskMesh, HoledMesh)
 
 #: Repair is tried if at most this share of the triangles fold: it is slow, and hopeless with more.
 MOST_FOLDED = 0.01
@@ -105,7 +106,9 @@ def _in_the_plane(
     made = best_of(mesh, tiers, work, _overlap, repair=repair)
     if made.extras["chosen"] not in tiers[-1]:
         return made
-    return replace(made, extras=made.extras | {"instead_of": "a map with a free boundary"})
+    uv, _ = with_area_pi(mesh, made.uv, repair=False)
+    extras = made.extras | {"instead_of": "a map with a free boundary"}
+    return replace(made, uv=uv, extras=extras)
 
 
 def _overlap(mesh: TriangleMesh, z: Complex) -> str:
