@@ -2,14 +2,15 @@
 Map a surface
 =============
 
-Map a surface to the unit disk, look at it under a checkerboard, and read the figures.
+Map a surface to the plane, look at it under a checkerboard, and read the figures.
 """
 
 import cembench
 
 # %%
 # A surface is a file, a pair of arrays, or the name of a family that can be made. This one is half
-# an ellipsoid. The algorithm need not be named: the default suits the kind of surface.
+# an ellipsoid. The algorithm need not be named: the default is the map with the smallest angle
+# errors that neither folds nor overlaps. ``target="disk"`` maps to the unit disk instead.
 
 surface = cembench.surface("hemi-ellipsoid", 4_000)
 result = cembench.parameterize(surface)
