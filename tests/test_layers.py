@@ -70,15 +70,15 @@ BUDGETS = {
     "core": 2_120,
     "mesh": 6_010,
     "linear_algebra": 1_540,
-    "conformal": 6_410,
+    "conformal": 6_530,
     "registry": 960,
     "results": 5_020,
-    "running": 7_500,
+    "running": 7_550,
     "drawing": 1_500,
     "report": 7_620,
     "validation": 2_310,
     "morphing": 1_350,
-    "api": 5_070,
+    "api": 5_110,
     "commands": 2_930,
 }
 
