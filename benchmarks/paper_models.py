@@ -111,10 +111,6 @@ READINGS: tuple[tuple[str, str, Call], ...] = (
 )
 
 
-SHORT = f"""
-| E_C, mean, SD | {" | ".join(title for _, title, _ in AS_PRINTED)} |
-|---|{"---|" * len(AS_PRINTED)}
-| {{model}} | {" | ".join(f"{{{column}}}" for column, _, _ in AS_PRINTED)} |"""
 BESIDE = """
 | model | algorithm | printed E_C | mean | SD | here E_C | mean | SD | folds | digits |
 |---|---|---:|---:|---:|---:|---:|---:|---:|---|
@@ -129,7 +125,7 @@ RANGES = """
 def paper_models(folder: Path) -> list[Section]:
     """Measure the paper's seven public models, and what numbering alone decides.
 
-    For docs/paper_models.md, and the short table of README.md, from the models in a folder
+    For docs/paper_models.md, from the models in a folder
     (`cembench fetch --group paper` prints one), known by their meshes whatever their files are
     called, and from other coarse disks there.
     """
@@ -141,7 +137,7 @@ def paper_models(folder: Path) -> list[Section]:
     parts += [f"{FOLDED} with its folds repaired, the default:", Table(repaired, BESIDE)]
     parts += ["## What numbering decides", nefertiti(meshes["Nefertiti"])]
     parts += [Table(list(ranges(folder)), RANGES)]
-    return [Section([short(rows)], "README.md"), Section(parts, "docs/paper_models.md")]
+    return [Section(parts, "docs/paper_models.md")]
 
 
 def measured(
@@ -174,16 +170,6 @@ def counted(rows: Sequence[Mapping[str, Any]]) -> str:
         f"{sum(counts.values())} of {3 * len(rows)} cells agree to the printed digits: {each}. "
         f"FDM's mean and SD agree on {angles} of {len(agreeing['FDM'])} models."
     )
-
-
-def short(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return a table by model: measured, and printed in brackets where it differs."""
-    by_model: dict[str, dict[str, str]] = {}
-    for row in rows:
-        pairs = zip(row["said"], row["here"], strict=True)
-        shown = ", ".join(own if own == said else f"{own} ({said})" for said, own in pairs)
-        by_model.setdefault(row["model"], {"model": row["model"]})[row["column"]] = shown
-    return Table(list(by_model.values()), SHORT)
 
 
 def ldm_choices(mesh: DiskMesh) -> list[Cells]:

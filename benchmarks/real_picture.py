@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.measuring import png
 from benchmarks.pages import ROOT, Section
-from cembench.report.content.findings import FLOOR
+from cembench.report.content.standings import FLOOR
 from cembench.results.families import family_means, share_interval
 from cembench.results.report_records import text_rows
 

@@ -20,7 +20,7 @@ LAYOUT = """
 | {what} | `{commit}` | {date} | {changed} | `{command}` | {took} |
 """
 #: What reads records alone, and no figure of which depends on anything but the kept reports.
-OF_RECORDS = ("peers_summary", "readme_speedups")
+OF_RECORDS = ("peers_summary", "cem_speedups", "readme_answer")
 
 
 def made_tables() -> list[str]:

@@ -167,6 +167,7 @@ class Surface(_Registered):
 
     source: str = ""
     paper_row: str = ""
+    fitted: str = ""
     landmarks: Landmarks | None = None
     kept: Callable[..., Path] | None = None
     exact_map: ExactMap | None = None
@@ -448,6 +449,7 @@ def surface_family(
     source: str = "",
     notes: str = "",
     paper_row: str = "",
+    fitted: str = "",
     landmarks: Landmarks | None = None,
     kept: Callable[..., Path] | None = None,
     exact_map: ExactMap | None = None,
@@ -469,6 +471,9 @@ def surface_family(
     paper_row : str
         The model of a paper that the surface stands for, if any; the profiles consist
         of these surfaces.
+    fitted : str
+        The algorithm whose printed energy and angle errors on that model the default parameters
+        were fitted to, if any; its figures here are marked, and decide nothing.
     landmarks : callable, optional
         Returns the named vertices, such as the tip of a nose, of a mesh of any size that the
         function made.
@@ -511,6 +516,7 @@ def surface_family(
             notes=notes or _notes(function),
             source=source,
             paper_row=paper_row,
+            fitted=fitted,
             landmarks=landmarks,
             kept=kept,
             exact_map=exact_map,

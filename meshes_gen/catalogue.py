@@ -1,12 +1,13 @@
 """The stand-ins, one for each model of the paper, with their landmarks.
 
-Each is a function ``(faces, *, seed, delaunay) -> DiskMesh`` whose default size is that of its row;
-the result is cached (:mod:`meshes_gen.cache`).
+Each is a function ``(faces, *, seed, levers) -> DiskMesh`` whose default size and levers are those
+of its row (:mod:`meshes_gen.rows`); the result is cached (:mod:`meshes_gen.cache`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
@@ -27,7 +28,8 @@ from .faces import EXPRESSIONS, HO, LIU, face_body
 from .foot import foot_body
 from .hand import left_hand_body
 from .head import Head
-from .implicit import Body
+from .implicit import Body, trimmed
+from .levers import Cut, Even, Gain, Jag, Levers, NonDelaunay, Smooth, hardened
 from .lion import chinese_lion_body
 from .remesh import has_remeshing_filter, mesh_of
 from .rows import ROWS
@@ -67,12 +69,12 @@ REVISIONS = {"ho-pouting-face-stand-in": 1, "liu-pouting-face-stand-in": 1}
 
 
 def stand_in(
-    name: str, faces: int | None = None, *, seed: int = 0, delaunay: bool = True
+    name: str, faces: int | None = None, *, seed: int = 0, levers: Levers | None = None
 ) -> DiskMesh:
     """Return the stand-in for a row, with the row's counts or with about `faces` triangles.
 
-    `seed` sets the random details of its shape; with ``delaunay=False`` about 5 % of the interior
-    edges are not Delaunay.
+    `seed` sets the random details of its shape and boundary; `levers` (default: the row's) how hard
+    it is to map.
 
     Raises
     ------
@@ -84,21 +86,27 @@ def stand_in(
     """
     if name not in ROWS:
         raise RegistryError(f"unknown stand-in {name!r}; known: {', '.join(ROWS)}.")
-    count = ROWS[name].faces if faces is None else faces
+    row = ROWS[name]
+    count, used = row.faces if faces is None else faces, row.levers if levers is None else levers
 
     def make() -> DiskMesh:
-        body, boundary = BODIES[name](seed), ROWS[name].boundary_at(count)
-        return mesh_of(DiskMesh, body, count, boundary, name=name, delaunay=delaunay, seed=seed)
+        return hardened(body_mesh(name, count, seed, used.cut), used, seed)
 
-    return cached(DiskMesh, name, _content(name, count, seed, delaunay), make)
+    return cached(DiskMesh, name, _content(name, count, seed, used), make)
 
 
-def _content(name: str, faces: int, seed: int, delaunay: bool) -> dict[str, Any]:
+def body_mesh(name: str, faces: int, seed: int = 0, cut: float = 0.0) -> DiskMesh:
+    """Return the smooth, evenly meshed body of a stand-in, its cut moved in by this share."""
+    body, boundary = BODIES[name](seed), ROWS[name].boundary_at(faces)
+    return mesh_of(DiskMesh, trimmed(body, cut), faces, boundary, name=name)
+
+
+def _content(name: str, faces: int, seed: int, levers: Levers) -> dict[str, Any]:
     """Return everything that determines the shape of a stand-in."""
     content = {
         "faces": faces,
         "seed": seed,
-        "delaunay": delaunay,
+        "levers": asdict(levers),
         "remeshing_filter": has_remeshing_filter(),
     }
     return content | {"revision": REVISIONS[name]} if name in REVISIONS else content
@@ -140,12 +148,25 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
 def _registered(name: str) -> Callable[..., DiskMesh]:
     """Return the stand-in for a row as a registered surface family."""
     row = ROWS[name]
+    own = row.levers
 
-    def make(faces: Faces = row.faces, *, seed: Seed = 0, delaunay: bool = True) -> DiskMesh:
-        return stand_in(name, faces, seed=seed, delaunay=delaunay)
+    def make(
+        faces: Faces = row.faces,
+        *,
+        seed: Seed = 0,
+        jag: Jag = own.jag,
+        smooth: Smooth = own.smooth,
+        even: Even = own.even,
+        gain: Gain = own.gain,
+        non_delaunay: NonDelaunay = own.non_delaunay,
+        centred: bool = own.centred,
+        cut: Cut = own.cut,
+    ) -> DiskMesh:
+        levers = Levers(jag, smooth, even, gain, non_delaunay, centred, cut)
+        return stand_in(name, faces, seed=seed, levers=levers)
 
-    def kept(faces: int, *, seed: int, delaunay: bool) -> Path:
-        return place_of(name, _content(name, faces, seed, delaunay))
+    def kept(faces: int, *, seed: int, **levers: Any) -> Path:
+        return place_of(name, _content(name, faces, seed, Levers(**levers)))
 
     make.__name__ = make.__qualname__ = name.replace("-", "_")
     make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."
@@ -154,6 +175,7 @@ def _registered(name: str) -> Callable[..., DiskMesh]:
         title=row.model,
         source="procedural stand-in",
         paper_row=row.model,
+        fitted=row.fitted,
         landmarks=partial(landmarks, name) if name in FACES else None,
         kept=kept,
     )

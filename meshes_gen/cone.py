@@ -12,6 +12,7 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
+from .levers import with_levers
 
 
 def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex128]:
@@ -22,6 +23,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 30.0) -> NDArray[np.complex
 
 
 @surface_family("cone", title="Cone", source="closed form", exact_map=exact_map)
+@with_levers
 def cone(
     faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 20_000,
     *,

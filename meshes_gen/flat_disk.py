@@ -11,9 +11,11 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
+from .levers import with_levers
 
 
 @surface_family("flat-disk", title="Flat disk", source="closed form")
+@with_levers
 def flat_disk(
     faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 5_000,
     *,

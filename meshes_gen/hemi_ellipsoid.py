@@ -10,10 +10,12 @@ from pydantic import Field
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
+from .levers import with_levers
 from .spherical_cap import spherical_cap
 
 
 @surface_family("hemi-ellipsoid", title="Half ellipsoid", source="closed form")
+@with_levers
 def hemi_ellipsoid(
     faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 50_000,
     *,

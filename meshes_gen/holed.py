@@ -15,6 +15,7 @@ from .cache import cached
 from .faces import HO, face_body, mask
 from .head import NEUTRAL, Head
 from .implicit import Body, Real, ellipsoid, sphere
+from .levers import with_levers
 from .remesh import has_remeshing_filter, mesh_of
 from .rows import ROWS
 
@@ -54,6 +55,7 @@ def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
 @surface_family(
     "holed-cap", title="Spherical cap with holes", source="closed form", exact_map=exact_map
 )
+@with_levers
 def holed_cap(
     faces: Annotated[int, Field(ge=2_000, le=MOST_FACES)] = 20_000,
     *,
@@ -81,6 +83,7 @@ def holed_cap(
 @surface_family(
     "ho-face-with-holes", title="Ho's Face with Holes", source="procedural stand-in for the model"
 )
+@with_levers
 def ho_face_with_holes(
     faces: Annotated[int, Field(ge=5_000, le=MOST_FACES)] = 100_000,
     *,

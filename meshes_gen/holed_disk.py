@@ -12,6 +12,8 @@ from pydantic import Field
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
+from .levers import with_levers
+
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 
@@ -22,6 +24,7 @@ TURN = np.pi * (3 - np.sqrt(5))
 
 
 @surface_family("holed-disk", title="Flat disk with holes", source="closed form")
+@with_levers
 def holed_disk(
     faces: Annotated[int, Field(ge=500, le=MOST_FACES)] = 20_000,
     *,

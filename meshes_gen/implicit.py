@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -50,6 +50,12 @@ class Body:
     def size(self) -> float:
         """Longest side of the box."""
         return float(np.max(np.subtract(self.upper, self.lower)))
+
+
+def trimmed(body: Body, share: float) -> Body:
+    """Return a body whose cut lies deeper by this share of its longest side."""
+    depth = share * body.size
+    return replace(body, keep=lambda p: body.keep(p) - depth) if share else body
 
 
 def evaluate(f: Field, p: Real) -> Real:

@@ -49,9 +49,6 @@ BASE = 110_000
 #: Every how manyth triangle of a first mesh, all oriented alike, is tested for facing outwards.
 ORIENTED_BY = 16
 
-#: Share of the interior edges that `delaunay=False` makes non-Delaunay.
-NON_DELAUNAY = 0.05
-
 #: The notice for a missing pymeshlab filter.
 FALLBACK_NOTE = Notice(
     NoticeKind.REMESHED_WITHOUT_FILTER,
@@ -450,16 +447,13 @@ def mesh_of(
     boundary: int,
     *,
     name: str,
-    delaunay: bool = True,
-    seed: int = 0,
     use_pymeshlab: bool | None = None,
 ) -> M:
     """Return the surface of `body` with `faces` triangles and `boundary` boundary vertices in all.
 
     `mesh_type` is DiskMesh for a body with one boundary loop, HoledMesh for more. The counts are
     exact, up to one triangle if their parities disagree and two for each edge that has to be split
-    because it cannot be flipped (about ten in a million). With ``delaunay=False`` about 5 % of the
-    interior edges, chosen by `seed`, are flipped to be non-Delaunay. The mesh's notices say whether
+    because it cannot be flipped (about ten in a million). The mesh's notices say whether
     pymeshlab's filter was missing; `use_pymeshlab` overrides that check.
 
     Raises
@@ -487,8 +481,6 @@ def mesh_of(
     V = shape.project(V, F, 0.3 * edge_length(area(V, F), len(F)), rounds=4)
     F = delaunay_flips(V, F)
     V, F = split_stuck(V, F)
-    if not delaunay:
-        F = break_delaunay(V, F, seed)
     V, F = split_chords(V, F)
     F = flip_ears(F, len(V))
     try:
@@ -499,7 +491,7 @@ def mesh_of(
         ) from error
 
 
-def break_delaunay(V: Real, F: Faces, seed: int, share: float = NON_DELAUNAY) -> Faces:
+def break_delaunay(V: Real, F: Faces, seed: int, share: float) -> Faces:
     """Flip edges, chosen by `seed`, until about `share` of the interior ones are not Delaunay.
 
     Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to slightly more

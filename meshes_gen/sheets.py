@@ -17,6 +17,7 @@ from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
+from .levers import with_levers
 from .rectangle import rectangle_grid, rectangle_to_disk
 
 Faces = Annotated[int, Field(ge=24, le=MOST_FACES)]
@@ -24,6 +25,7 @@ Complex = NDArray[np.complex128]
 
 
 @surface_family("cylinder-sheet", title="Cylinder sheet", source="closed form")
+@with_levers
 def cylinder_sheet(
     faces: Faces = 20_000,
     *,
@@ -43,6 +45,7 @@ def cylinder_sheet(
 
 
 @surface_family("swiss-roll", title="Swiss roll", source="closed form")
+@with_levers
 def swiss_roll(
     faces: Faces = 20_000,
     *,
@@ -68,6 +71,7 @@ def swiss_roll(
 
 
 @surface_family("catenoid-sheet", title="Catenoid sheet", source="closed form")
+@with_levers
 def catenoid_sheet(
     faces: Faces = 20_000,
     *,
@@ -91,6 +95,7 @@ def ring_map(V: NDArray[np.float64]) -> Complex:
 
 
 @surface_family("catenoid-ring", title="Catenoid", source="closed form", exact_map=ring_map)
+@with_levers
 def catenoid_ring(
     faces: Faces = 20_000, *, height: Annotated[float, Field(gt=0, le=6)] = 1.0
 ) -> HoledMesh:

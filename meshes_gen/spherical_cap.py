@@ -12,6 +12,7 @@ from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
 from .disk_grid import disk_grid
+from .levers import with_levers
 
 
 def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
@@ -20,6 +21,7 @@ def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex
 
 
 @surface_family("spherical-cap", title="Spherical cap", source="closed form", exact_map=exact_map)
+@with_levers
 def spherical_cap(
     faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 20_000,
     *,

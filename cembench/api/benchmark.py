@@ -8,7 +8,7 @@ from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cembench.api.notebook import html_table
+from cembench.api.notebook import NotebookProgress, html_table, is_notebook
 from cembench.api.settings import (
     AnyPath,
     Backend,
@@ -26,7 +26,6 @@ from cembench.api.settings import (
 )
 from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 from cembench.core.wording import Advice
 from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
@@ -42,20 +41,17 @@ if TYPE_CHECKING:
     from cembench.running.surfaces import SurfaceInput
     from cembench.running.watcher import Watcher
 
-#: Columns of :meth:`Run.table`.
-FEW = (
-    "mesh",
-    "algorithm",
-    "solves",
-    "status",
-    "seconds",
-    "seconds_low",
-    "seconds_high",
-    "speedup",
-    "conformal_energy",
-    "angle_error_mean_deg",
-    "flipped_triangles",
-)
+#: Columns of :meth:`Run.table`, under the headings that they have on a terminal; 80 columns wide.
+FEW = {
+    "surface": "surface",
+    "algorithm": "algorithm",
+    "solves": "solves",
+    "status": "status",
+    "seconds": "seconds",
+    "comparable_energy": "E_C",
+    "angle_error_mean_deg": "angle°",
+    "flipped_triangles": "folds",
+}
 
 
 @dataclass(frozen=True)
@@ -108,20 +104,32 @@ class Run:
         Parameters
         ----------
         reference : str
-            The algorithm whose speedup over the others is included.
+            The algorithm whose speedup over the others is included with `full`.
         full : bool
-            Whether to return all columns, about eighty, instead of those most looked at.
+            Whether to return all columns, about eighty, under the names that records have,
+            instead of those most looked at.
 
         Returns
         -------
         pandas.DataFrame
-            Figures, seconds with a 95 % interval, and status of each cell.
+            Surface, algorithm, status, median seconds, E_C (over the image's area where the
+            boundary is free), mean angle error in degrees, and folds. The
+            linear-algebra policy is a column if there are several. Numbers are rounded as on a
+            terminal.
 
         """
         import pandas as pd
 
-        table = pd.DataFrame(self.rows(reference))
-        return table if full else table[[name for name in FEW if name in table]]
+        from cembench.results.columns import comparable_energy
+
+        table = pd.DataFrame(self.rows(reference)).rename(columns={"mesh": "surface"})
+        if full:
+            return table
+        table["comparable_energy"] = [comparable_energy(record) for record in self.records()]
+        table = table.round({"comparable_energy": 4, "angle_error_mean_deg": 2, "seconds": 5})
+        left_out = {"solves"} if len(table) and table["solves"].nunique() == 1 else set()
+        few = [name for name in FEW if name in table and name not in left_out]
+        return table[few].rename(columns=FEW)
 
     def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
         """Return the data of :meth:`table` as one dictionary per cell.
@@ -152,14 +160,19 @@ class Run:
         Returns
         -------
         pandas.DataFrame
-            One row per surface, algorithm and policy, with the interval from paired rounds; empty
-            if the reference was not measured.
+            One row per surface, algorithm and policy, with the interval from paired rounds and
+            who is faster than whom; empty if the reference was not measured.
 
         """
-        columns = ["mesh", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
+        columns = ["surface", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
         table = self.table(reference, full=True)
         compared = table[table["reference"].notna()]
-        return compared[[*columns, "verdict"]].reset_index(drop=True)
+        words = {"faster": "{0} is faster than {1}", "slower": "{1} is faster than {0}"}
+        verdicts = [
+            words.get(verdict, verdict).format(algorithm, reference)
+            for verdict, algorithm in zip(compared["verdict"], compared["algorithm"], strict=True)
+        ]
+        return compared[columns].assign(verdict=verdicts).reset_index(drop=True)
 
     def report(
         self,
@@ -203,8 +216,6 @@ class Run:
 
         Raises
         ------
-        MissingExtra
-            A package for reports is not installed.
         RecordError
             The run has no records, a record or a map is damaged, or the folder cannot be written.
         ParameterError
@@ -218,7 +229,6 @@ class Run:
         from cembench.results.store import Store
         from cembench.results.verify import Depth, sound_records
 
-        require(Extra.REPORT, "a report")
         asked = find_paper(paper) if paper else None
         records = sound_records(Store(self.folder), Depth.everything if verify else Depth.sample)
         files = [Path(file) for file in tables]
@@ -237,20 +247,17 @@ class Run:
 
     def _repr_html_(self) -> str:
         from cembench.conformal.metrics import METRICS
+        from cembench.results.columns import comparable_energy
 
-        names = (
-            "conformal_energy",
-            "angle_error_mean_deg",
-            "flipped_triangles",
-            "beltrami_area_mean",
-        )
+        names = ("angle_error_mean_deg", "flipped_triangles", "beltrami_area_mean")
         shown = [metric for metric in METRICS if metric.name in names]
-        heads = ["surface", "algorithm", "status", "seconds", *(m.title for m in shown)]
+        heads = ["surface", "algorithm", "status", "seconds", "E_C", *(m.title for m in shown)]
         lines = []
-        for row in self.rows():
-            seconds = row["seconds"]
+        for row, record in zip(self.rows(), self.records(), strict=True):
+            seconds, energy = row["seconds"], comparable_energy(record)
             line = [row["mesh"], row["algorithm"], row["status"]]
             line.append("" if seconds is None else f"{seconds:.3g}")
+            line.append("" if energy is None else f"{energy:.4f}")
             lines.append([*line, *(m.text(row[m.name]) if m.name in row else "" for m in shown)])
         return html_table(lines, heads)
 
@@ -261,6 +268,7 @@ def benchmark(
     algorithms: Sequence[str] | None = None,
     *,
     profile: Literal["quick", "standard", "paper"] | None = None,
+    paper: str | None = None,
     mesh_dir: Sequence[AnyPath] = (),
     sets: Sequence[str] = (),
     limit: Annotated[int, Range(1, 1_000_000)] | None = None,
@@ -308,6 +316,9 @@ def benchmark(
         default: the usual ones, or the paper's own for the profile quick.
     profile : {"quick", "standard", "paper"}, optional
         The paper's models: the smallest, those up to a number of faces, or all.
+    paper : str, optional
+        Run the algorithms on this paper's own models as it ran them: an installed paper, or its
+        folder (default: with `profile` the paper of the profiles, else none).
     mesh_dir : sequence of paths
         All mesh files in a folder but NPZ; those that cannot be used are left out.
     sets : sequence of str
@@ -422,6 +433,7 @@ def benchmark(
     from cembench.api.sets import exhibit_of
     from cembench.results import run_folder
     from cembench.results.exhibits import write_exhibit
+    from cembench.results.papers import NO_PAPER, find_paper, usual_paper
     from cembench.results.profiles import Profile, algorithms_of, surfaces_of
     from cembench.results.records import REFERENCE
     from cembench.results.store import Store
@@ -431,6 +443,7 @@ def benchmark(
     from cembench.running.plan import MeasurementSettings, plan_cells
 
     named, models = list(surfaces), Profile(profile) if profile else None
+    asked = find_paper(paper) if paper else usual_paper() if models else NO_PAPER
     if output is not None:
         run_folder.check(Path(output))
     check_cluster(cluster, pairing, reporter)
@@ -511,7 +524,7 @@ def benchmark(
     tasks = []
     for policy in dict.fromkeys(solves):
         settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
-        tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles)
+        tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles, asked)
     folder = Path(output or tempfile.mkdtemp(prefix="cembench-run-"))
     plan = Plan(tasks, Store(folder), options, cluster)
     if dry_run:
@@ -524,7 +537,8 @@ def benchmark(
                 reporter.note(f"{mesh.name}: {notice}")
     seconds = inf if rounds else options.budget or inf
     with reporter.watching(len(tasks), seconds, on_cluster=cluster is not None) as shown:
-        records = plan.measure(watcher or shown, same_environment=same_environment)
+        line = NotebookProgress(len(tasks)) if reporter is SILENT and is_notebook() else None
+        records = plan.measure(watcher or shown or line, same_environment=same_environment)
     return Run(folder, tuple(records), plan)
 
 

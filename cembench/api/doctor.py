@@ -33,7 +33,7 @@ _FOR = {
     Extra.METIS: "orders rows by nested dissection: less memory",
     Extra.PARDISO: "adds another linear-algebra back end",
     Extra.PARQUET: "exports runs as Parquet",
-    Extra.REPORT: "writes reports",
+    Extra.REPORT: "makes plots of reports interactive",
     Extra.STANDINS: "makes stand-ins for the paper's models",
     Extra.VIDEO: "writes films as MP4",
     Extra.VTP: "reads VTP files",

@@ -229,10 +229,10 @@ def map_files(
     file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
     check_options(paths, outputs, file_options)
     is_atlas = any(a.target == "atlas" for a in candidates)
-    if is_atlas and (file_options.extras or bake or len(paths) > 1):
+    if is_atlas and (file_options.extras.keys() - {"html"} or bake or len(paths) > 1):
         raise ParameterError.about(
-            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
-            "{html} and {bake}, which need one UV per vertex.",
+            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh} "
+            "and {bake}, which need one UV per vertex.",
             name=candidates[0].name,
         )
     sources = local_files(paths, registry, reporter)
@@ -256,11 +256,7 @@ def map_files(
             role = {mesh.name: provenance_of(registry, mesh)}
             tasks += plan_cells([taken], [mesh], parameters or {}, settings, plugins, role)
         files.append(FileJobs(shells, tuple(tasks), None if together else place))
-    if preview and is_atlas:
-        reporter.note(
-            "no picture was drawn: the islands of an atlas have no fixed positions in the plane"
-        )
-    elif preview:
+    if preview:
         chosen = [file.tasks[0].algorithm for file in files]
         pictures = picture_files(sources, chosen, [f.output for f in files], overwrite=overwrite)
         refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cembench.api.components import Shells, areas_of
 from cembench.api.write_maps import FileOptions, save_map
+from cembench.conformal.atlas import laid_out
 from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
@@ -220,7 +221,11 @@ def draw_maps(
     if len(maps) == 1:
         title = f"{record.cell.mesh}: {record.title}"
         words = caption(record.outcome.metrics)
-        write_preview(shells.parts[0].mesh, maps[0], picture, title=title, caption=words)
+        mesh, z = shells.parts[0].mesh, maps[0]
+        if record.target == "atlas":
+            mesh, z = laid_out(mesh, z)
+        turned = record.target != "atlas"
+        write_preview(mesh, z, picture, title=title, caption=words, turned=turned)
         return
     moved = packed(maps, areas_of(shells.parts), equal=equal)
     joined = Shells.of(shells.parts)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from cembench.api.components import Shells
 from cembench.api.map_outputs import draw_maps, write_extras
 from cembench.api.write_maps import FileOptions, write_shells, write_together
+from cembench.conformal.atlas import laid_out
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
@@ -195,7 +196,8 @@ class Maps:
         files = {"output": file.output, **extras, "preview": file.picture}
         if extras:
             with self.reporter.busy("writing"):
-                notices = write_extras(self.file_options, mesh, uv, record)
+                shown = laid_out(mesh, uv) if record.target == "atlas" else (mesh, uv)
+                notices = write_extras(self.file_options, *shown, record)
             noticed = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
         return replace(mapped, written=written, notices=noticed)

@@ -297,7 +297,7 @@ class Result:
         axes.set_axis_off()
         return figure
 
-    def show(self, path: str | os.PathLike[str] | None = None) -> Path:
+    def show(self, path: str | os.PathLike[str] | None = None) -> Path | None:
         """Show an interactive page with the surface and its image.
 
         It is shown below the cell of a notebook, else in the browser. The page works offline and
@@ -310,8 +310,8 @@ class Result:
 
         Returns
         -------
-        Path
-            The file of the page.
+        Path or None
+            The file of the page; None if a notebook shows it.
 
         Raises
         ------
@@ -333,12 +333,12 @@ class Result:
         if path is not None:
             write_view_page(Path(path), page)
             return Path(path)
-        shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
-        write_view_page(shown, page)
         if is_notebook():
             show_page(page)
-        else:
-            webbrowser.open(shown.as_uri())
+            return None
+        shown = Path(tempfile.mkdtemp(prefix="cembench-")) / f"{file_name(self.mesh.name)}.html"
+        write_view_page(shown, page)
+        webbrowser.open(shown.as_uri())
         return shown
 
     def _png(self) -> bytes:

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING
 from cembench.api.benchmark import Run
 from cembench.api.settings import AnyPath, budget_seconds, bytes_of
 from cembench.core.arguments import checked
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
@@ -89,8 +88,6 @@ def reproduce(
 
     Raises
     ------
-    MissingExtra
-        A package for reports is not installed.
     RecordError
         The folder is not a run, or cannot be written to.
     ParameterError
@@ -107,6 +104,7 @@ def reproduce(
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.results.intervals import USUAL_PRECISION
+    from cembench.results.papers import usual_paper
     from cembench.results.profiles import Profile, algorithms_of
     from cembench.results.store import Store
     from cembench.running.environment import usable_cores
@@ -114,7 +112,6 @@ def reproduce(
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, plan_cells
 
-    require(Extra.REPORT, "a report")
     folder = Path(output)
     run_folder.check(folder)
     folders.check(folder / "report", "report")
@@ -129,7 +126,7 @@ def reproduce(
     chosen = [registry.algorithm(name) for name in algorithms_of(Profile.quick, registry)]
     surfaces, roles = _surfaces(registry, chosen, offline, jobs, reporter)
     settings = MeasurementSettings.until_precise(USUAL_PRECISION)
-    tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles)
+    tasks = plan_cells(chosen, surfaces, {}, settings, standing=roles, paper=usual_paper())
     with reporter.watching(len(tasks), options.budget or inf) as progress:
         records = run_tasks(tasks, Store(folder), options, progress)
     run = Run(folder, tuple(records))

@@ -100,7 +100,7 @@ def validate(
 
     """
     from cembench.api.run_plan import read_surfaces
-    from cembench.core import extras, folders
+    from cembench.core import folders
     from cembench.results.profiles import Profile, surfaces_of
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, distribute_parameters, plan_cells
@@ -109,7 +109,6 @@ def validate(
     from cembench.validation.verdict import Requirement
 
     if output is not None:
-        extras.require(extras.Extra.REPORT, f"the page in {output}")
         folders.check(Path(output), "validation")
     with reporter.busy(f"importing {os.fspath(plugin)}"):
         algorithm, registry, plugins = load_solver(os.fspath(plugin))
@@ -173,7 +172,7 @@ def write_validation(validation: Validation, folder: Path) -> None:
     """
     from cembench.core import folders
     from cembench.core.atomic import draft_folder, unwritable, write_model
-    from cembench.report.render.html import write_html  # needs an extra
+    from cembench.report.render.html import write_html
     from cembench.validation.document import document_of
 
     try:

@@ -15,12 +15,12 @@ from cembench.commands.console import (
     note,
     out,
     print_json,
-    print_notices,
     print_pair,
 )
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
+from cembench.core.notices import NoticeKind
 
 if TYPE_CHECKING:
     from cembench.api.map_surfaces import Mapped, Maps
@@ -56,12 +56,22 @@ def map_(
         for path, notice in mapped.notices:
             note(f"{path}: {notice}")
         if not as_json:
-            print_notices([mapped.surface.mesh])
+            _print_notices(mapped, verbose=verbose)
             if len(maps) > 1 and not verbose:
                 _show_line(mapped, len(maps.done), len(maps))
             else:
-                _show_all(mapped, verbose=verbose, keep_invalid=maps.keep_invalid)
+                output = maps.output is not None
+                _show_all(mapped, output, verbose=verbose, keep_invalid=maps.keep_invalid)
     _print_end(maps, as_json=as_json)
+
+
+def _print_notices(mapped: Mapped, *, verbose: bool) -> None:
+    """Print the notices of a surface; those on the paper's theory only with the others."""
+    mesh = mapped.surface.mesh
+    theory = NoticeKind.DEFINITION_1
+    for notice in mesh.notices:
+        if verbose or notice.kind is not theory:
+            note(f"{mesh.name}: {notice}")
 
 
 def _print_end(maps: Maps, *, as_json: bool) -> None:
@@ -92,17 +102,22 @@ def _more_of(mapped: Mapped) -> dict[str, Any]:
     return proof | refined | ({"repair": repaired.counts} if repaired else {})
 
 
-def _show_all(mapped: Mapped, *, verbose: bool, keep_invalid: bool) -> None:
-    """Print the figures of a single mapped surface, and the files written."""
-    from cembench.report.record_table import figures_table
+def _show_all(mapped: Mapped, output: bool, *, verbose: bool, keep_invalid: bool) -> None:
+    """Print the figures of a single mapped surface, and the files written.
+
+    `output`: whether there is a file that its UVs are in.
+    """
+    from cembench.report.record_table import figures_table, texture_advice
 
     words = (("overlay", mapped.overlay), ("certificate", mapped.certificate))
     out.print(figures_table(mapped.record, full=verbose, more=words))
     for what, where in mapped.written.items():
         print_pair(f"{what:<9}", where)  # below the figures
-    if mapped.uv is not None and not mapped.written:
+    if mapped.uv is not None and not output and "output" not in mapped.written:
         more = "" if mapped.ok or keep_invalid else " --keep-invalid"
-        out.print(f"Nothing was written; add{more} -o FILE.obj to keep the map.", style="dim")
+        out.print(f"The map was not written: add{more} -o FILE.obj to keep it.", style="dim")
+    if not verbose and (advice := texture_advice(mapped.record)):
+        out.print(advice[0].upper() + advice[1:] + ".", style="bold yellow")
 
 
 def _show_line(mapped: Mapped, number: int, count: int) -> None:

@@ -150,6 +150,11 @@ def show(
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records, verify_map
 
+    if cell and Path(cell).is_dir():
+        raise ParameterError(
+            f"{cell} is a folder, and show takes a cell: cembench show CELL --run {cell}. "
+            f"cembench status {cell} lists its cells."
+        )
     store = Store(run)
     records = _chosen(sound_records(store, Depth.records), cell)
     findings = [

@@ -11,7 +11,7 @@ import typer
 
 from cembench.api import submissions as api
 from cembench.commands.app import app
-from cembench.commands.console import Json, Markdown, err, out, print_json
+from cembench.commands.console import Json, Markdown, err, out, print_json, warn
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import RequireSigned
 from cembench.core.overwriting import refuse_inputs
@@ -32,6 +32,12 @@ def submit(call: Call, *, as_json: Json = False) -> None:
         print_json(asdict(submission) | {"output": str(call.keywords["output"])})
         return
     out.print(f"{submission.cells} cells, {submission.maps} with maps: {call.keywords['output']}")
+    if left_out := submission.unlicensed:
+        warn(
+            f"no licence is stated for {', '.join(left_out)}, so these surfaces are not sent and "
+            "the figures of their maps cannot be checked. If they are yours, add "
+            "--surfaces-licence, e.g. CC-BY-4.0."
+        )
 
 
 @app.command(epilog="Example:  cembench submissions check submissions --require-signed signers")

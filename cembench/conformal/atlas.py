@@ -61,6 +61,15 @@ class CutMap:
         return int(self.island.max()) + 1
 
 
+def laid_out(mesh: TriangleMesh, corners: Complex) -> tuple[TriangleMesh, Complex]:
+    """Return a surface cut along the seams of an atlas, and its map, for pictures.
+
+    Islands that are mirrored are mirrored back, together, so that none covers another.
+    """
+    cut = cut_map(mesh, corners)
+    return cut.surface, cut.uv
+
+
 def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
     """Cut a surface where the images of its corners (m, 3) differ."""
     F = mesh.F

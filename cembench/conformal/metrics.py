@@ -494,7 +494,7 @@ METRICS: tuple[Metric, ...] = (
     ),
     Metric(
         "undersampled_share", "undersampled", "undersampled", "of the surface", ".1e", ".2g",
-        f"share of the surface with less than one texel per ten-thousandth of it, at {SIDE:,} px",
+        f"share of the surface with less than 1 texel for each ten-thousandth, at {SIDE:,} px",
         lambda f: undersampled_share(f.areas, f.image_areas, extent_of(f.uv)),
         gauge_invariant=False,
     ),

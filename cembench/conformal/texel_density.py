@@ -106,13 +106,24 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
     if not share:
         return words
     part = f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
-    lacking = f"{part} of the surface gets less than one texel per ten-thousandth of it"
+    lacking = f"{part} of the surface gets less than 1 texel"
     return f"{words}; at {SIDE:,} px, {lacking}"
 
 
+#: Large numbers as people write them.
+_NAMED = ((1e12, "trillion"), (1e9, "billion"), (1e6, "million"))
+
+
 def density_words(ratio: float) -> str:
-    """Return a ratio of densities with two digits or none after the point."""
-    return f"{ratio:,.0f} : 1" if 10 <= ratio < 1e6 else f"{ratio:.2g} : 1"
+    """Return a ratio of densities as people write it.
+
+    >>> density_words(2.26), density_words(1538.2), density_words(6.8e7)
+    ('2.3 : 1', '1,538 : 1', '68 million : 1')
+    """
+    for size, name in _NAMED:
+        if ratio >= size:
+            return f"{ratio / size:.2g} {name} : 1" if ratio < 1e15 else "unbounded"
+    return f"{ratio:,.0f} : 1" if ratio >= 10 else f"{ratio:.2g} : 1"
 
 
 def needs_islands(metrics: Mapping[str, float | int | None]) -> bool:
@@ -125,6 +136,6 @@ def needs_islands(metrics: Mapping[str, float | int | None]) -> bool:
 
 #: What to do where :func:`needs_islands`.
 ISLANDS = (
-    "one chart does not serve this surface as a texture: cut it into islands, with the algorithm "
-    "xatlas or in a modelling program (in Blender: Smart UV Project)"
+    "not usable as a texture in one piece: cut it into islands, with the algorithm xatlas (pip "
+    "install 'cembench[xatlas]') or in a modelling program (in Blender: Smart UV Project)"
 )

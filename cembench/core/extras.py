@@ -1,6 +1,6 @@
 """Optional libraries, and the extra of the package that installs each.
 
-The default installation can map, measure and inspect surfaces. Reports, stand-ins, films and the
+The default installation can map, measure and report. Interactive plots, stand-ins, films and the
 like need more libraries, which come with extras. They are checked here when they are needed, so
 that the error for a missing one names the command that installs it.
 """

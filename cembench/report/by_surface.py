@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from cembench.report.content.evidence import AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration
-from cembench.report.document import Column, Table, Tone, Value, entry, missing, words
-from cembench.results.columns import FrameColumn, worded
+from cembench.report.document import Column, Origin, Table, Tone, Value, entry, missing, words
+from cembench.results.columns import FITTED, FrameColumn, half_width, is_fitted, worded
 from cembench.results.comparison import UNSTABLE_WIDTH
 from cembench.results.frame import evaluate
 from cembench.results.papers import Paper
@@ -82,9 +82,14 @@ def figure_entry(evidence: Evidence, record: Record, column: FrameColumn) -> Val
     if column.timed:
         if evidence.row(record)["unstable"]:
             why = f"unstable: its 95 % interval is wider than {UNSTABLE_WIDTH:.0%} of the figure"
-        text = f"{text}{'!' if why else ''} {evidence.machines.of(record)}".rstrip()
+        half = half_width(record)
+        width = "" if half is None else f"±{half:.0f}%"
+        parts = (text + "!" * bool(why), width, evidence.machines.of(record))
+        text = " ".join(filter(None, parts))
     tone: Tone = "doubtful" if why else ""
-    origin = evidence.by_hash[record.cell.mesh_hash].origin
+    origin: Origin = evidence.by_hash[record.cell.mesh_hash].origin
+    if origin == "stand-in" and column.name in FITTED and is_fitted(record):
+        origin = "fitted"
     return Value(text, float(number), origin, key, why, tone)
 
 

@@ -51,6 +51,7 @@ from cembench.report.document import (
 from cembench.results.columns import (
     COLUMNS,
     FrameColumn,
+    is_free,
     mark_of,
     marks_explained,
     seconds_words,
@@ -244,7 +245,7 @@ def declared_table(
     known = {"policy": policy, "in_policy": in_policy(evidence, policy), "n": str(len(frame))}
     known |= {"surfaces": str(frame["place"].nunique())}
     known |= {"once": once if evidence.stand_ins_left_out else ""}
-    known |= {"reference": evidence.reference_label, **texts}
+    known |= {"reference": evidence.reference_label, "to": "", **texts}
     below = tuple(dict.fromkeys((*notes, *_notes(evidence, spec, frame))))
     if spec.rows == "surface":
         return _of_surfaces(evidence, spec, frame, surfaces, called or name, known, below)
@@ -378,7 +379,8 @@ def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iter
             yield from (f"{where}: {note}" for note in record.outcome.notes)
     others = sorted({record.target for record in records} - {DISK})
     if "targets" in spec.notes and others:
+        free = any(is_free(target) for target in others)
         yield (
-            f"* not a map to the disk ({', '.join(others)}): its E_C is not comparable with those "
-            "of disks"
+            f"* not a map to the disk ({', '.join(others)}): compare it with maps to the same "
+            f"target{'; E_C is over the area of the image, whose size is free' if free else ''}"
         )

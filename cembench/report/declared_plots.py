@@ -72,6 +72,10 @@ class DeclaredAxis(Declaration):
         return Axis(self.value if title is None else title, self.log, self.low, self.high)
 
 
+#: Facets whose panels have one linear-algebra policy each.
+_BY_POLICY = ("solves", "contest")
+
+
 class DeclaredPanel(Declaration):
     """What makes one or more pairs of axes; see docs/tables.md for the keys."""
 
@@ -105,8 +109,8 @@ class DeclaredPanel(Declaration):
     def _fits(self) -> DeclaredPanel:
         if not self.y.value or not (self.x.value or self.kind == "profile"):
             raise ValueError('a plot has "x" and "y", expressions or tables with "value"')
-        if self.kind == "profile" and self.policy == "all" and self.facet != "solves":
-            raise ValueError('a profile of policy = "all" has facet = "solves"')
+        if self.kind == "profile" and self.policy == "all" and self.facet not in _BY_POLICY:
+            raise ValueError('a profile of policy = "all" has facet = "solves" or "contest"')
         return self
 
 
@@ -227,7 +231,7 @@ def declared_plot(
     texts = {
         "as_good": AS_GOOD,
         "degrees": DEGREES,
-        "surface": surface.title if surface else "",
+        "surface": surface.full_title if surface else "",
         "counts": ", ".join(f"{d.n} of {len(evidence.surfaces)} ({d.panel.of})" for d in drawn),
         "panels": "; ".join(one.about for one in drawn),
         "left_out": spec.left_out.format(", ".join(left_out)) if left_out else "",
@@ -252,7 +256,8 @@ def _panels(
         if name and name not in frame:
             known = ", ".join(map(str, frame))
             raise ParameterError(f"{key} = {name!r} names no column; known: {known}.")
-    order: dict[Any, int] = {name: k for k, name in enumerate((*evidence.policies, *models))}
+    named = (*evidence.policies, *evidence.contest_names, *models)
+    order: dict[Any, int] = {name: k for k, name in enumerate(named)}
     values = sorted(frame[facet].unique(), key=lambda v: order.get(v, -1)) if facet else [""]
     make = _profile if spec.kind == "profile" else _points
     for value in values:

@@ -11,8 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from html import escape
 from itertools import groupby
-from pathlib import PurePosixPath
+from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING, Any, Literal, TypeAlias, TypeVar
 
 if TYPE_CHECKING:
@@ -22,13 +23,17 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 #: Origin of a number; a table never mixes two origins in a column without a mark.
-Origin = Literal["printed", "model", "stand-in", "surface", "derived", ""]
+Origin = Literal["printed", "model", "stand-in", "fitted", "surface", "derived", ""]
 
 #: Description of each origin, and the mark after its numbers.
 ORIGINS: Mapping[Origin, tuple[str, str]] = {
     "printed": ("printed in the paper", "ᵖ"),
     "model": ("measured here on the paper's own model", "ᵐ"),
     "stand-in": ("measured here on a stand-in for the paper's model", "ˢ"),
+    "fitted": (
+        "measured here on a stand-in that was fitted to this printed figure: it decides nothing",
+        "ᶠ",
+    ),
     "surface": ("measured here on a surface that is not in the paper", ""),
     "derived": ("computed from other figures of this report", ""),
 }
@@ -211,6 +216,30 @@ class Gallery:
 
 
 @dataclass(frozen=True)
+class Judged:
+    """A claim's test on surfaces of one origin, or on the printed figures.
+
+    `on` says on how many of what, `figures` what was found, and `counted` how many tests hold.
+    """
+
+    on: str
+    figures: str
+    verdict: Verdict = "not tested here"
+    counted: str = ""
+
+    @property
+    def counted_verdict(self) -> str:
+        """The verdict with how many tests hold."""
+        return ", ".join(filter(None, (self.verdict, self.counted)))
+
+    @property
+    def sentence(self) -> str:
+        """The verdict and what it rests on."""
+        on, figures = self.on[0].upper() + self.on[1:], self.figures.rstrip(".")
+        return f"{on}: {self.counted_verdict} ({figures})."
+
+
+@dataclass(frozen=True)
 class Claim:
     """A claim of the paper's text with its test.
 
@@ -230,6 +259,9 @@ class Claim:
         What it says in a few words.
     counted : str
         How many tests hold; of tests on surfaces, with the 95 % interval of the share of families.
+    parts : mapping
+        The verdicts apart, by origin of the surfaces, models first; "printed" is a control on the
+        printed tables. `verdict` and `counted` are those of the first.
 
     """
 
@@ -242,6 +274,7 @@ class Claim:
     remark: str = ""
     plain: str = ""
     counted: str = ""
+    parts: Mapping[str, Judged] = field(default_factory=dict)
 
     @property
     def title(self) -> str:
@@ -301,8 +334,8 @@ class Findings:
         The headline, then further sentences.
     suspects : tuple of str
         Maps that are far worse than the others on their surface.
-    table : Table or None
-        The run's own figures, by surface and algorithm; not for the paper's run.
+    tables : tuple of Table
+        The paper's main claims; or the standings of each target, and the run's own figures.
     figures : tuple of Finding
         Key figures.
     picture, plot : Figure or None
@@ -312,13 +345,13 @@ class Findings:
 
     sentences: tuple[Sentence, ...]
     suspects: tuple[str, ...] = ()
-    table: Table | None = None
+    tables: tuple[Table, ...] = ()
     figures: tuple[Finding, ...] = ()
     picture: Figure | None = None
     plot: Figure | None = None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Report:
     """A whole report.
 
@@ -334,6 +367,17 @@ class Report:
     records: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     findings: Findings | None = None
     paper: Paper | None = None
+    #: The page that it was written to, if any.
+    page: Path | None = None
+
+    def __repr__(self) -> str:
+        """Return the title and the page, a line each."""
+        return f"{self.title}: {len(self.records)} records\n{self.page or 'not written'}"
+
+    def _repr_html_(self) -> str:
+        link = f"<a href='{escape(str(self.page))}'>{escape(str(self.page))}</a>"
+        about = f"{escape(self.title)}: {len(self.records)} records"
+        return f"{about}<br>{link if self.page else 'not written'}"
 
 
 def missing(why: str, text: str = "-") -> Value:
@@ -431,8 +475,8 @@ def sections_of(report: Report) -> Iterator[Section]:
 def items_of(report: Report, kind: type[T]) -> Iterator[T]:
     """Yield all items of a kind in reading order; the figures of galleries are figures."""
     findings = report.findings
-    if findings is not None and isinstance(findings.table, kind):
-        yield findings.table
+    if findings is not None:
+        yield from (table for table in findings.tables if isinstance(table, kind))
     for section in sections_of(report):
         for item in section.items:
             if isinstance(item, kind):

@@ -69,7 +69,7 @@ def leaderboard(entrants: Sequence[Entrant], command: str) -> Report:
     cells = Section("cells", "Every cell of every run", (_cells(frame),), page=True)
     sections = (
         Section("angles", "Whose maps have the smallest angle errors?", angles),
-        Section("seconds", "Who is fastest at equal angles?", (_seconds(valid),)),
+        Section("seconds", "Who is fastest at equal angles?", _seconds(valid, targets)),
         Section("success", "Whose maps are valid?", (_success(frame),)),
         Section("machines", "Machines", (_machines(entrants),)),
         Section("measured", "Every cell", sections=(cells,)),
@@ -162,17 +162,19 @@ def _angles(valid: pd.DataFrame, target: str) -> Item:
     return _compared("angles", f"angles-{slug(target)}", title, once)
 
 
-def _seconds(valid: pd.DataFrame) -> Item:
-    """Compare the seconds of maps about as good as the best, within each run and machine."""
-    title = "Seconds at equal angles"
-    known = valid[valid["as_good"] & valid["seconds"].notna() & (valid["target"] == DISK)]
-    place = ["run", "machine", "mesh_hash", "solves"]
+def _seconds(valid: pd.DataFrame, targets: Sequence[str]) -> tuple[Item, ...]:
+    """Compare the seconds of maps about as good as the best to their target, within each run."""
+    title, tables = "Seconds at equal angles", []
+    known = valid[valid["as_good"] & valid["seconds"].notna()]
+    place = ["run", "machine", "mesh_hash", "solves", "target"]
     known = known[known.groupby(place)["label"].transform("nunique") > 1]
-    if known.empty:
-        return Gap(title, "no run has two algorithms with equally good maps of a surface")
-    least = known.groupby(place)["seconds"].transform("min")
-    known = known.assign(ratio=known["seconds"] / least)
-    return _compared("seconds", "seconds-at-equal-angles", title, known)
+    known = known.assign(ratio=known["seconds"] / known.groupby(place)["seconds"].transform("min"))
+    for target in targets:
+        own = known[known["target"] == target]
+        name = f"seconds-at-equal-angles-{slug(target)}"
+        tables += [_compared("seconds", name, f"{title}, {target}", own)] if len(own) else []
+    why = "no run has two algorithms with equally good maps of a surface to one target"
+    return tuple(tables) or (Gap(title, why),)
 
 
 def _compared(declared: str, name: str, title: str, rows: pd.DataFrame) -> Table:

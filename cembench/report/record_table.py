@@ -35,10 +35,23 @@ def figures_table(
         elif words := phrase([line], {}, known):
             rows.append((filled(line["name"], {}, known), words))
     rows += (("note", str(note)) for note in record.outcome.notes)
-    if record.outcome.status == "ok" and needs_islands(record.outcome.metrics):
-        rows.append(("note", ISLANDS))
+    if full and (advice := texture_advice(record)):
+        rows.append(("note", advice))
     rows += ((name, words) for name, words in more if words)
     return Table.of("record", "", [Column("", numeric=False)] * 2, rows)
+
+
+def texture_advice(record: Record) -> str:
+    """Return what to do where a valid map is not usable as a texture; "" where it is.
+
+    A map to the disk has a free boundary to try first.
+    """
+    if record.outcome.status != "ok" or not needs_islands(record.outcome.metrics):
+        return ""
+    free = "try a free boundary first, with the algorithm bff-free; else " * (
+        record.target == "disk"
+    )
+    return ISLANDS.replace(": ", f": {free}", 1)
 
 
 def _known(record: Record) -> dict[str, Any]:

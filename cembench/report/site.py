@@ -23,7 +23,6 @@ from types import MappingProxyType
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_text
 from cembench.core.errors import ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.names import distinct_slugs
 from cembench.core.version import installed_version
 from cembench.report.content.evidence import Evidence
@@ -31,6 +30,7 @@ from cembench.report.content.report import build_report
 from cembench.report.leaderboard import Entrant, leaderboard
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
+from cembench.report.render.html import render
 from cembench.results.machines import machine_of, machine_of_record, software_differences
 from cembench.results.records import REFERENCE
 
@@ -101,11 +101,8 @@ def publish(
         No run, or the same one twice.
     RecordError
         A folder holds no run, or the site's folder holds other files.
-    MissingExtra
-        What only reports need is not installed.
 
     """
-    require(Extra.REPORT, "a site")
     places = [run.resolve() for run in runs]
     if not places or len(set(places)) < len(places):
         raise ParameterError("publish takes at least one run; name each run once.")
@@ -132,8 +129,6 @@ def publish(
 
 
 def _publish_one(evidence: Evidence, name: str, draft: Path) -> PublishedRun:
-    from cembench.report.render.html import render  # needs the extra
-
     with draft_folder(draft / "making") as making:
         report = build_report(evidence, making, f"cembench report {name}")
         write_text(draft / "runs" / name / "index.html", render(report, making))

@@ -19,7 +19,6 @@ from pathlib import Path
 
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable
-from cembench.core.extras import Extra, require
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import Progress, build_report, is_of_the_paper
 from cembench.report.declared_plots import further
@@ -27,6 +26,7 @@ from cembench.report.document import Report
 from cembench.report.export import export_rows, write_tables_csv
 from cembench.report.export_format import Format
 from cembench.report.plots import drawn
+from cembench.report.render.html import write_html
 from cembench.report.render.latex import write_latex
 from cembench.report.render.markdown import write_markdown
 from cembench.report.shared_drawing import shared_drawing
@@ -63,14 +63,11 @@ def write_report(
     ------
     ParameterError
         A declaration is wrong, or does not fit the run.
-    MissingExtra
-        A package for reports is not installed.
     RecordError
         The folder `run` holds no run, no record, or no model of the paper; `folder` holds files
         that are not a report's or were changed since, or cannot be written.
 
     """
-    require(Extra.REPORT, "a report")
     evidence = Evidence.of(run, paper, records)
     own = evidence.paper.folder / MEASURED
     of_paper = [own] if is_of_the_paper(evidence) and own.is_file() else []
@@ -91,7 +88,7 @@ def write_report(
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
-    return report
+    return replace(report, page=folder / "index.html")
 
 
 def _write_all(report: Report, evidence: Evidence, folder: Path) -> None:
@@ -99,6 +96,4 @@ def _write_all(report: Report, evidence: Evidence, folder: Path) -> None:
     write_tables_csv(report, folder)
     write_markdown(report, folder)
     write_latex(report, folder)
-    from cembench.report.render.html import write_html  # needs the extra
-
     write_html(report, folder)

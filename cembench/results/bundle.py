@@ -81,6 +81,9 @@ class Submission:
         The number of maps whose figures were computed again.
     signer : str
         Who signed it, if that was asked for.
+    unlicensed : tuple of str
+        Surfaces that were left out when it was packed, with no licence stated: nobody can compute
+        the figures of their maps again.
 
     Examples
     --------
@@ -96,6 +99,7 @@ class Submission:
     machines: tuple[str, ...] = ()
     maps: int = 0
     signer: str = ""
+    unlicensed: tuple[str, ...] = ()
 
     @property
     def accepted(self) -> bool:
@@ -156,7 +160,9 @@ def pack(
                 + "\nMeasure these cells again, with `cembench run`."
             )
         write_bytes(path, draft.read_bytes())
-    return sent
+    cells = [record.cell for record in run.records()] if maps else []
+    unlicensed = dict.fromkeys(c.mesh for c in cells if not surfaces.get(c.mesh_hash))
+    return replace(sent, unlicensed=tuple(unlicensed))
 
 
 def _contents(run: Store, surfaces: Mapping[str, str] | None) -> dict[str, bytes]:

@@ -86,6 +86,7 @@ def seconds_words(record: Record) -> str:
 MIB, MILLION = 2**20, 1e6
 #: The metrics of maps, those of atlases last.
 FIGURES = (*METRICS, *ATLAS_METRICS)
+_ENERGY = next(metric for metric in METRICS if metric.name == "conformal_energy")
 
 
 def significant(number: float, digits: int = 3) -> str:
@@ -165,6 +166,26 @@ def _at(path: str) -> Callable[[Record], Any]:
     return of
 
 
+#: Targets whose images have a size of their own.
+_FIXED = ("disk", "circular holes")
+
+
+def is_free(target: str) -> bool:
+    """Whether a target leaves the size of the image free.
+
+    >>> is_free("free boundary"), is_free("disk")
+    (True, False)
+    """
+    return target not in _FIXED
+
+
+def comparable_energy(record: Record) -> float | None:
+    """Return E_C, over the image's area where the target leaves its size free."""
+    if is_free(record.target):
+        return record.outcome.relative_energy
+    return record.outcome.metrics.get(_ENERGY.name)
+
+
 def _metric(metric: Metric) -> FrameColumn:
     def of(record: Record) -> Any:
         return record.outcome.metrics.get(metric.name)
@@ -218,6 +239,15 @@ def _solve_from(record: Record) -> str | None:
 def family_of(record: Record) -> str:
     """Return the object that a record's surface shows; if unknown, the surface's own name."""
     return record.mesh.family or record.cell.mesh
+
+
+#: Figures to which stand-ins are fitted.
+FITTED = ("conformal_energy", "angle_error_mean_deg", "angle_error_sd_deg")
+
+
+def is_fitted(record: Record) -> bool:
+    """Whether a record's :data:`FITTED` figures are of the fit itself, and so decide nothing."""
+    return record.mesh.fitted == record.cell.algorithm
 
 
 def half_width(record: Record) -> float | None:
@@ -312,6 +342,7 @@ EXPORTED = (
     _C("notices", lambda r: [str(notice) for notice in r.mesh.notices]),
     _C("origin", _at("mesh.origin")),
     _C("paper_row", lambda r: r.mesh.paper_row or None),
+    _C("fitted", is_fitted),
     _C("source", lambda r: r.mesh.source or None),
     _C("family", family_of),
     _C("solves", _at("cell.solves"), "solves"),
@@ -328,6 +359,7 @@ EXPORTED = (
 #: What is derived of it for tables.
 DERIVED = (
     _C("relative_energy", _at("outcome.relative_energy"), "E_C / A", form=".4f"),
+    _C("comparable_energy", comparable_energy, "E_C", form=_ENERGY.form),
     _C("half_width", half_width, "±%", form=".0f", lacking="fewer than six rounds"),
     _C("memory_mib", _memory, "memory", "MiB", ",.0f"),
     _C(

@@ -37,9 +37,11 @@ NOT_DETECTED = (
     "(docs/cheating.md)."
 )
 
-#: A cell whose interval is wider than this share of its figure gets a warning; a cell that reaches
-#: the default precision does not.
-UNSTABLE_WIDTH = 2 * USUAL_PRECISION
+#: Seconds whose interval is wider than this share of them get a warning.
+UNSTABLE_WIDTH = 0.25
+#: A ratio of seconds is wide if its interval is wider than this share of it; one that reaches the
+#: default precision is not.
+WIDE_RATIO = 2 * USUAL_PRECISION
 
 
 @dataclass(frozen=True)

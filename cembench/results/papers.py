@@ -190,8 +190,9 @@ class StatedClaim(_Part):
         The result in words, what is said instead without any case, and what follows the remark:
         texts with expressions in braces, in which the values of the cases are columns, and `held`
         and `tested` are numbers.
-    over : str
-        Rows of the surfaces that the remark counts, by default those tested; None: no such remark.
+    on : tuple of {"measured", "printed"}
+        What it is tested on: the run's surfaces, those of each origin apart, and the printed
+        tables, as a control.
 
     """
 
@@ -212,7 +213,7 @@ class StatedClaim(_Part):
     )
     none: str = ""
     further: str = ""
-    over: str = ""
+    on: tuple[Literal["measured", "printed"], ...] = ("measured",)
     remark: str = ""
 
 
@@ -253,6 +254,8 @@ class Paper(_Part):
     errata: tuple[Erratum, ...] = ()
     runs: tuple[HowRun, ...] = ()
     claims: tuple[StatedClaim, ...] = ()
+    #: The names of the main claims, for the head of a report (default: failing ones first).
+    headline: tuple[str, ...] = ()
     #: Numbers that the claims name.
     numbers: Mapping[str, Any] = {}
 
@@ -461,6 +464,10 @@ def _check(paper: Paper) -> None:
             what = f"no table has the column 'faces' for {model!r}"
             raise _wrong(paper.folder / "tables.toml", "tables", what)
     names = [claim.name for claim in paper.claims]
+    for name in paper.headline:
+        if name not in names:
+            what = f"there is no claim {name!r}; known: {', '.join(names) or 'none'}"
+            raise _wrong(paper.folder / "paper.toml", "headline", what)
     for name in names:
         if names.count(name) > 1:
             raise _wrong(paper.folder / "claims.toml", f"claim {name!r}", "occurs twice")

@@ -32,6 +32,13 @@ SCHEMA_VERSION = 1
 
 #: The algorithm that others are compared with where neither a paper nor an option names one.
 REFERENCE = "cem"
+#: The algorithm that others of a target are compared with, unless a run says otherwise.
+USUAL_REFERENCES = {
+    "disk": REFERENCE,
+    "free boundary": "lscm",
+    "circular holes": "koebe-cem",
+    "disk with holes": "harmonic-filled",
+}
 
 #: With this many cores busy with other work, a process counts as measured on a busy machine.
 BUSY_CORES = 0.25
@@ -212,6 +219,8 @@ class MeshFacts(BaseModel):
     #: Who published it, and the object that it shows; "" where unknown, and in older records.
     source: str = ""
     family: str = ""
+    #: The algorithm whose printed energy and angle errors a stand-in was fitted to, if any.
+    fitted: str = ""
 
 
 class Neighbours(BaseModel):

@@ -11,6 +11,7 @@ from statistics import median, stdev
 
 from cembench.results.comparison import (
     UNSTABLE_WIDTH,
+    WIDE_RATIO,
     both_ratios,
     circumstances,
     compare,
@@ -138,11 +139,17 @@ def stability_words(records: Sequence[Record]) -> str:
         most = max(len(r.outcome.rounds) for r in timed)
         times = "once" if most == 1 else f"at most {most} times"
         return f"Each cell was timed {times}, so no intervals are given: {_why(without)}."
-    sentence = (
-        f"{len(unstable) or 'None'} of {len(timed)} {'time' if len(timed) == 1 else 'times'} "
-        f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "
-        f"{UNSTABLE_WIDTH:.0%} of the figure)"
-    )
+    if len(unstable) + len(without) == len(timed):
+        start = (
+            f"No time is stable: {len(unstable)} of {len(timed)} have a 95 % interval wider than "
+        )
+        sentence = f"{start}{UNSTABLE_WIDTH:.0%} of the figure"
+    else:
+        sentence = (
+            f"{len(unstable) or 'None'} of {len(timed)} times "
+            f"{'is' if len(unstable) < 2 else 'are'} unstable (95 % interval wider than "
+            f"{UNSTABLE_WIDTH:.0%} of the figure)"
+        )
     if unstable:
         sentence += f": {_why(unstable)}"
         busy = sum(_is_beside_work(r) for r in unstable)
@@ -176,10 +183,8 @@ def scatter_words(records: Sequence[Record]) -> str:
         sentence += f" between processes and by {median(within):.1%} within one process"
     sentence += f" (medians over {len(separate)} pairs)"
     if widths:
-        unstable = sum(width > UNSTABLE_WIDTH for width in widths)
-        sentence += (
-            f"; {unstable} of {len(widths)} have an interval wider than {UNSTABLE_WIDTH:.0%}"
-        )
+        wide = sum(width > WIDE_RATIO for width in widths)
+        sentence += f"; {wide} of {len(widths)} have an interval wider than {WIDE_RATIO:.0%}"
     return f"{sentence}."
 
 

@@ -20,7 +20,7 @@ from cembench.mesh.files import (
 )
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.results.papers import paper_of
+from cembench.results.papers import NO_PAPER, Paper
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
 
@@ -53,6 +53,8 @@ class Provenance:
     family : str
         The object that it shows. Surfaces of one family, such as scans of one statue, are not
         independent samples; "" if unknown, which makes the surface a family of its own.
+    fitted : str
+        The algorithm whose printed figures the surface was fitted to, if any.
 
     """
 
@@ -60,6 +62,7 @@ class Provenance:
     origin: MeshOrigin = "surface"
     source: str = ""
     family: str = ""
+    fitted: str = ""
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,7 @@ def plan_cells(
     how: MeasurementSettings,
     plugins: Sequence[str] = (),
     standing: Mapping[str, Provenance] = MappingProxyType({}),
+    paper: Paper = NO_PAPER,
 ) -> list[Task]:
     """Return a task for every algorithm on every surface that it takes, grouped by surface.
 
@@ -94,9 +98,9 @@ def plan_cells(
 
     In `parameters`, the key ``name`` sets a parameter of every algorithm that has it, and
     ``algorithm.name`` of that one only. `standing` is keyed by the surfaces' names; surfaces not in
-    it are not the paper's. On the paper's own models algorithms have the parameters with which the
-    paper ran them (:meth:`~cembench.results.papers.Paper.as_printed`), unless `parameters` sets
-    others.
+    it are not the paper's. On the own models of the `paper` that the run is for, algorithms have
+    the parameters with which it ran them (:meth:`~cembench.results.papers.Paper.as_printed`),
+    unless `parameters` sets others.
 
     Raises
     ------
@@ -124,8 +128,9 @@ def plan_cells(
             )
         role = standing.get(mesh.name, Provenance())
         facts = mesh_facts(mesh, role)
-        model = role.paper_row if role.origin == "model" else ""
-        settings = paper_of(model).as_printed(model, algorithms) | dict(parameters)
+        is_model = role.origin == "model" and role.paper_row in paper.models
+        own = paper.as_printed(role.paper_row, algorithms) if is_model else {}
+        settings = own | dict(parameters)
         arguments = distribute_parameters(algorithms, settings)
         for taker in takers:
             cell = cell_of(taker, mesh, arguments[taker.name], how, sources[taker.name])
@@ -193,6 +198,7 @@ def mesh_facts(mesh: TriangleMesh, standing: Provenance = Provenance()) -> MeshF
         origin=standing.origin,
         source=standing.source,
         family=standing.family,
+        fitted=standing.fitted,
     )
 
 
@@ -232,10 +238,15 @@ def mesh_files(folder: Path) -> list[Path]:
 
 def provenances(registry: Registry, names: Iterable[str]) -> dict[str, Provenance]:
     """Return where these generated surfaces are from: each name is a family of its own."""
-    rows = {name: registry.surface(name).paper_row for name in names}
+    known = map(registry.surface, names)
     return {
-        name: Provenance(row, "stand-in" if row else "surface", family=name)
-        for name, row in rows.items()
+        one.name: Provenance(
+            one.paper_row,
+            "stand-in" if one.paper_row else "surface",
+            family=one.name,
+            fitted=one.fitted,
+        )
+        for one in known
     }
 
 

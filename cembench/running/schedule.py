@@ -150,9 +150,11 @@ def look(
         partner = partners.get(label)
         reference = (states[partner].task.cell, rounds[partner]) if partner else None
         lacks[label] = lack(state.task.cell, rounds[label], reference)
+    # What a reference is measured for are the ratios of others to it.
+    wanted = lacks | dict.fromkeys(partners.values(), 0.0)
     more = next_look(number, options.most_rounds) - number
     costs = {label: more * state.price for label, state in states.items()}
-    chosen: set[str] = set() if last else affordable(lacks, costs, partners, seconds_left)
+    chosen: set[str] = set() if last else affordable(wanted, costs, partners, seconds_left)
     short: Ended = "rounds" if last else "budget"
     precise: Ended = "precise"
     ending = [label for label in states if label not in chosen]
@@ -201,20 +203,17 @@ def _until_precise(cells: Sequence[CellState], number: int | None) -> dict[str, 
 def lack(cell: Cell, rounds: Rounds, reference: tuple[Cell, Rounds] | None = None) -> float:
     """Return the factor by which a cell's intervals are too wide; at most 1 is precise.
 
-    The intervals are that of its seconds and, if it was measured with a reference, that of the
-    ratio. Where compared cells shared processes, only the ratio counts. Infinite if there is no
-    interval yet; 0 for a cell with a fixed number of rounds.
+    The interval is that of its ratio to a reference, if it was measured with one, else of its
+    seconds. Infinite if there is none yet; 0 for a cell with a fixed number of rounds.
     """
     if cell.precision is None:
         return 0.0
-    shared = bool(rounds) and all(r.together for r in rounds)
-    own = _half(interval_of_rounds(cell, rounds), lower_median([r.seconds for r in rounds]))
-    widths = [0.0 if shared else own]
     share = share_of(len(rounds), cell, reference[0]) if reference else 1.0
     ratios = ratios_of_rounds(rounds, reference[1], share) if reference else []
-    if reference and ratios:
-        widths.append(_half(ratio_interval(ratios, share), lower_median(ratios)))
-    return max(widths) / cell.precision
+    if ratios:
+        return _half(ratio_interval(ratios, share), lower_median(ratios)) / cell.precision
+    own = interval_of_rounds(cell, rounds)
+    return _half(own, lower_median([r.seconds for r in rounds])) / cell.precision
 
 
 def _half(interval: Interval | None, figure: float) -> float:

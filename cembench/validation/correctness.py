@@ -164,6 +164,8 @@ def _rate(
     return _finding(
         f"{what} under refinement",
         f"on {series.surface.name} {shown}: order {order:.2f}",
+        surface=series.surface.name,
+        orders=(order, least),
         ok=order >= least or max(errors) <= rounding,
         least=least,
     )
@@ -179,6 +181,7 @@ def reaches_the_exact_map(series: RefinementSeries) -> ValidationFinding:
         "exact map",
         f"on {series.surface.name} {', '.join(f'{e:.2g}' for e in errors)} away: order "
         f"{_order(series, errors):.2f}",
+        surface=series.surface.name,
         ok=errors[-1] <= POSITION_ERROR,
         within=POSITION_ERROR,
     )
@@ -194,6 +197,7 @@ def keeps_the_modulus(series: RefinementSeries) -> ValidationFinding:
         f"on {series.surface.name} off by {', '.join(f'{o:+.1e}' for o in off)}; "
         f"reciprocal error {', '.join(f'{c.reciprocal_error:.1e}' for c, _ in pairs)}",
         ok=finest.encloses(uv[finest.corners]),
+        surface=series.surface.name,
         lower=finest.lower,
         upper=finest.upper,
     )

@@ -213,7 +213,7 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     yield ratio(quotient(pair.energy, pair.baseline_energy))
     yield measured(pair.angle, ".3f")
     yield measured(pair.baseline_angle, ".3f", theirs)
-    yield ratio(quotient(pair.angle, pair.baseline_angle))
+    yield ratio(pair.angle_ratio)
     yield measured(pair.seconds, ".4f")
     yield measured(pair.baseline_seconds, ".4f", theirs)
     if program:

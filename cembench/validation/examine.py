@@ -13,7 +13,7 @@ from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.results.records import DEFAULT_ROUNDS, Record
+from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
 from cembench.running.local import run_tasks
@@ -44,15 +44,8 @@ from cembench.validation.scaling import (
 from cembench.validation.solver import Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
-#: Default baseline for each target.
-_USUAL_BASELINE = {
-    "disk": "cem",
-    "free boundary": "lscm",
-    "circular holes": "koebe-cem",
-    "disk with holes": "harmonic-filled",
-}
 #: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
-_GROWTH_REFERENCE = _USUAL_BASELINE | {"circular holes": "direct-cem-holes"}
+_GROWTH_REFERENCE = USUAL_REFERENCES | {"circular holes": "direct-cem-holes"}
 
 
 @dataclass(frozen=True)
@@ -276,7 +269,7 @@ def baselines(
 
     """
     if asked is None:
-        usual = _USUAL_BASELINE[algorithm.target]
+        usual = USUAL_REFERENCES.get(algorithm.target, "")
         return (usual,) if usual in registry.algorithms and usual != algorithm.name else ()
     kind = surfaces.mesh_kind(algorithm)
     for name in asked:

@@ -22,21 +22,45 @@ class ValidationFinding(BaseModel):
 
     stage: Stage
     name: str
+    #: The surface that it is about, if it is one.
+    surface: str = ""
     ok: bool
+    #: Of a figure under refinement: its order, and the least that a conformal map's has.
+    orders: tuple[float, float] | None = None
     #: Whether the figures do not show if it is a fault; `ok` is true then.
     undecided: bool = False
     measured: str
     allowed: str
     remedy: str
 
+    @property
+    def title(self) -> str:
+        """The check, with its surface."""
+        return f"{self.name} on {self.surface}" if self.surface else self.name
+
 
 def finding(
-    stage: Stage, name: str, measured: str, *, ok: bool, undecided: bool = False, **known: Any
+    stage: Stage,
+    name: str,
+    measured: str,
+    *,
+    ok: bool,
+    undecided: bool = False,
+    surface: str = "",
+    orders: tuple[float, float] | None = None,
+    **known: Any,
 ) -> ValidationFinding:
     """Return the finding of a check of `findings.toml`; `known` stand in its text in braces."""
     said = {key: text.format_map(known) for key, text in _declared()[stage][name].items()}
     return ValidationFinding(
-        stage=stage, name=name, ok=ok, undecided=undecided, measured=measured, **said
+        stage=stage,
+        name=name,
+        surface=surface,
+        orders=orders,
+        ok=ok,
+        undecided=undecided,
+        measured=measured,
+        **said,
     )
 
 

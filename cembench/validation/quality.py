@@ -38,6 +38,8 @@ from cembench.validation.finding import Stage, ValidationFinding, finding
 TIE = 0.01
 #: Energies below this share of the image's area are rounding, and count as equal.
 _NO_ENERGY = 1e-9
+#: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
+_NO_ANGLE = 0.01
 _GAUGE = "common_gauge_energy"
 
 
@@ -78,6 +80,14 @@ class Pair(BaseModel):
     """One surface: our figures and the baseline's; None if there is no valid map."""
 
     model_config = ConfigDict(frozen=True)
+
+    @property
+    def angle_ratio(self) -> float | None:
+        """Our mean angle error over the baseline's; those that are rounding count as equal."""
+        ours, theirs = self.angle, self.baseline_angle
+        if ours is None or theirs is None:
+            return None
+        return max(ours, _NO_ANGLE) / max(theirs, _NO_ANGLE)
 
     surface: str
     faces: int
@@ -160,7 +170,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
                 if p.energy is not None and p.baseline_energy is not None
             ]
         ),
-        angle=sides([p.angle / p.baseline_angle for p in pairs if p.angle and p.baseline_angle]),
+        angle=sides([ratio for p in pairs if (ratio := p.angle_ratio) is not None]),
         speed=compare_speed([(mine[name], theirs[name]) for name in names]),
         solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
     )

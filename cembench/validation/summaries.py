@@ -61,7 +61,7 @@ def write_junit(validation: Validation, path: Path) -> None:
         suite = _suite(root, stage, validation)
         for finding in validation.findings:
             if finding.stage == stage:
-                case = _case(suite, finding.name, validation)
+                case = _case(suite, finding.title, validation)
                 if not finding.ok:
                     fault = Xml.SubElement(case, "failure", message=_clean(finding.measured))
                     fault.text = _clean(f"allowed: {finding.allowed}\nto do: {finding.remedy}")

@@ -106,11 +106,16 @@ def sentence(validation: Validation) -> str:
 
 def _invalid(faults: Sequence[ValidationFinding]) -> str:
     first, *others = faults
-    text = f"invalid: {first.name}: {first.measured}"
-    if others:
-        names = ", ".join(dict.fromkeys(fault.name for fault in others))
-        text += f"; also: {names}"
-    return text
+    if first.orders is not None:
+        order, least = first.orders
+        what = first.name.removesuffix(" under refinement")
+        return (
+            f"invalid: not conformal. Its {what} does not vanish under refinement (order "
+            f"{order:.2f} on {first.surface}; a conformal map has {least:g} or more). If that is "
+            "intended, declare conformal=False"
+        )
+    names = ", ".join(dict.fromkeys(fault.name for fault in others))
+    return f"invalid: {first.name}: {first.measured}" + (f"; also: {names}" if names else "")
 
 
 def _energy_words(against: BaselineComparison) -> str:

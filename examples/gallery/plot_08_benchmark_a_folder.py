@@ -27,7 +27,7 @@ meshes = sorted(folder.glob("*.obj"))
 # then cells are measured until they are known to 5 %.
 
 run = cembench.benchmark(meshes, ["cem", "lscm"], rounds=1, output=folder / "run")
-run.table()[["mesh", "algorithm", "status", "angle_error_mean_deg", "flipped_triangles"]]
+run.table()[["surface", "algorithm", "status", "angle°", "folds"]]
 
 # %%
 # The second call measures nothing: everything is there.
@@ -37,6 +37,6 @@ print(len(again.records()), "records in", again.folder.name)
 
 # %%
 
-table = run.table().pivot(index="mesh", columns="algorithm", values="angle_error_mean_deg")
+table = run.table().pivot(index="surface", columns="algorithm", values="angle°")
 table.plot.bar(rot=0, ylabel="mean angle error in degrees", figsize=(6, 3.2))
 plt.show()

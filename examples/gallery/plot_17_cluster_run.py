@@ -29,7 +29,7 @@ if __name__ == "__main__":
         cluster="local:2",
     )
     table = run.table()
-    shown = ["mesh", "algorithm", "status", "angle_error_mean_deg"]
+    shown = ["surface", "algorithm", "status", "angle°"]
     print(table[shown].to_string(index=False))
 
 # %%
@@ -37,6 +37,6 @@ if __name__ == "__main__":
 
 if __name__ == "__main__":
     print(len(run.records()), "records in", run.folder.name)
-    errors = table.pivot(index="mesh", columns="algorithm", values=shown[-1])
+    errors = table.pivot(index="surface", columns="algorithm", values=shown[-1])
     errors.plot.bar(rot=0, ylabel="mean angle error in degrees", figsize=(6, 3.2))
     plt.show()

@@ -190,6 +190,21 @@ def becomes_decreasing(history: Sequence[float]) -> bool:
     return not steps[-1] and sorted(steps, reverse=True) == steps
 
 
+def steps_to_the_same(
+    history: Sequence[float], other: Sequence[float], percent: float
+) -> tuple[int, int, float]:
+    """Return the iterations of two histories to the higher of their last energies.
+
+    An energy within `percent` above it counts. The third value is the difference of the last ones.
+    """
+    goal = max(history[-1], other[-1]) * (1 + percent / 100)
+    first, second = (
+        next(k for k, energy in enumerate(energies) if energy <= goal)
+        for energies in (history, other)
+    )
+    return first, second, history[-1] - other[-1]
+
+
 def _rising(history: Sequence[float]) -> list[bool]:
     return [b > a * (1 + ROUNDING) for a, b in pairwise(history)]
 

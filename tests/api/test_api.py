@@ -162,8 +162,10 @@ def test_benchmark_gives_tables(disk, tmp_path):
     )
     table = run.table("harmonic-circle")
     assert isinstance(table, pd.DataFrame)
-    assert set(table["mesh"]) == {disk.name, "surface-2"}
+    assert set(table["surface"]) == {disk.name, "surface-2"}
     assert set(table["status"]) == {"ok"}
+    assert max(map(len, table.to_string().splitlines())) <= 80
+    assert {"surface", "angle_error_mean_deg"} <= set(run.table(full=True))
     assert len(run.speedups("harmonic-circle")) == 2
     assert "<table" in run._repr_html_()
     again = cembench.benchmark([disk], ["lscm"], rounds=1, output=tmp_path / "run")

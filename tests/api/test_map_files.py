@@ -290,3 +290,22 @@ def test_an_overlay_says_what_it_does_not_go_with(cli, bumpy, options, remedy):
     assert code == 2
     assert re.search(remedy, " ".join(err.split())), err
     assert not (cli.folder / "x.obj").exists()
+
+
+def test_a_map_that_no_texture_fits_ends_with_what_to_do(cli):
+    cylinder = cembench.surface("cylinder-sheet", 400)
+    long = cembench.DiskMesh.from_arrays(cylinder.V * [1, 1, 40], cylinder.F)
+    cembench.write_mesh(cli.folder / "long.obj", long)
+    code, out, err = cli("map", "long.obj", "-a", "direct-cem", "-o", "uv.obj")
+    assert code == 0, err
+    last = " ".join(out.split()).partition("output")[2]
+    assert "Not usable as a texture in one piece: try a free boundary first" in last
+    assert "cembench[xatlas]" in last
+    assert "Definition 1" not in err
+
+
+def test_a_map_that_is_not_written_is_said_so_beside_a_picture(cli):
+    cembench.write_mesh(cli.folder / "cap.obj", cembench.surface("spherical-cap", 200))
+    code, out, _ = cli("map", "cap.obj", "--preview")
+    assert code == 0
+    assert "The map was not written: add -o FILE.obj" in " ".join(out.split())

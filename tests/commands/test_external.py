@@ -81,14 +81,21 @@ def test_an_atlas_goes_into_every_format_that_holds_uvs(cli, face, suffix):
     assert (cli.folder / f"uv{suffix}").stat().st_size > 1000
 
 
-@pytest.mark.parametrize(
-    "more", [("-o", "uv.off"), ("--html", "a.html"), ("--remesh", "a.obj"), ("--bake", "a.png")]
-)
+@pytest.mark.parametrize("more", [("-o", "uv.off"), ("--remesh", "a.obj"), ("--bake", "a.png")])
 def test_what_an_atlas_cannot_give_is_refused_before_it_is_made(cli, face, more):
     words = ("map", face, "--command", command("hangs"), "--program", "target=atlas", *more)
     code, _, err = cli(*words)
     assert code == 2, err
     assert not any(path.suffix in (".off", ".html", ".png") for path in cli.folder.iterdir())
+
+
+def test_an_atlas_has_a_preview_and_a_page(cli, face):
+    words = ("map", face, "--command", command("cut"), "--program", "target=atlas")
+    code, out, err = cli(*words, "-o", "uv.obj", "--preview", "--html", "a.html")
+    assert code == 0, err
+    assert (cli.folder / "uv.png").stat().st_size > 5000
+    assert "prepareViews" in (cli.folder / "a.html").read_text()
+    assert "uv.png" in out
 
 
 def test_a_program_that_is_not_there_is_skipped_with_what_brings_it(cli, face):

@@ -106,7 +106,7 @@ def test_status_does_not_count_what_was_measured_again(edited):
     code, out, _ = edited("status", "one")
     assert code == 0
     assert "1  older records of cells measured again" in out
-    assert "2 of 2 times are unstable" in out
+    assert "No time is stable: 2 of 2 have" in out
 
 
 def test_merge_brings_runs_together(runs):

@@ -132,7 +132,7 @@ def test_the_report_shows_printed_beside_measured_and_opens_the_source(
     tables = {table.name: table for table in items_of(report, Table)}
     first = tables["table-46"]
     rows = {row[0].text: [value.text for value in row] for row in first.rows}
-    assert rows["wavy~49928f"][2:] == ["0.45", "2.00", "0.27", "1.00"]
+    assert rows["wavy~49928f"][2:] == ["0.45", "2.00 ±0%", "0.27", "1.00 ±0%"]
     assert rows["sphere~50880f"][2] == ""
     assert "table-123" not in tables
     address = "https://github.com/educelab/OpenABF/pull/46"

@@ -89,7 +89,7 @@ def sample_report(folder):
                 ("Of 4 claims, 1 does not hold here: ", CLAIMS[2], "; 1 holds."),
             ),
             suspects=(f"FDM on {HOSTILE}: 70.3 degrees, the other algorithms' median is 2.4",),
-            table=_own(surfaces),
+            tables=(_own(surfaces),),
             figures=(Finding("14 of 16", "cells ended with a valid map"),),
         ),
         paper=CITATION,

@@ -27,7 +27,7 @@ def test_a_paper_costs_few_lines():
 
 
 def test_its_title_tables_and_misprints_are_there(report):
-    assert report.title == "Maps onto Circles: its claims, tables and figures, measured"
+    assert report.title == "Maps onto Circles: measured again"
     assert report.paper == PAPER
     tables = {table.name: table for table in items_of(report, Table)}
     assert {"table-1", "table-3"} <= tables.keys()
@@ -70,7 +70,7 @@ def test_a_run_without_any_of_its_models_is_said(small_run):
 
 def test_the_command_takes_a_folder(cli, small_run, quick_drawing):
     told = cli("report", small_run, "-o", "out", "--paper", FOLDER, "--json")[1]
-    assert '"title": "Maps onto Circles: its claims' in told
+    assert '"title": "Maps onto Circles: measured' in told
     code, _, error = cli("report", small_run, "-o", "out", "--paper", "nowhere")
     assert code == 2
     assert "neither an installed paper nor a folder" in " ".join(error.split())

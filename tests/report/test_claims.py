@@ -9,7 +9,7 @@ from cembench.surfaces.spherical_cap import spherical_cap
 from cembench.conformal.metrics import all_metrics, dilatations
 from cembench.core.errors import ParameterError
 from cembench.registry import load_registry
-from cembench.report.content.claims import at_a_glance, claims, counted, verdict_of
+from cembench.report.content.claims import at_a_glance, claims, counted, in_short, verdict_of
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection, _angles
 from cembench.results.records import Round
@@ -68,11 +68,74 @@ def test_the_claims_at_a_glance_are_in_plain_words_failing_ones_first(found, evi
     assert set(by_words) == {claim.plain for claim in evidence.paper.claims}
     assert all(claim.plain for claim in evidence.paper.claims)
     faster = by_words["CEM is faster than QIEM, FDM and LDM on every model."]
-    assert [entry.text for entry in faster[1:3]] == ["holds in part", "6 of 10"]
-    assert by_words["Holes become circles."][2].text == "-"
-    verdicts = [row[1].text for row in table.rows]
+    titles = [column.title for column in table.columns]
+    assert titles[1:-1] == ["on stand-ins", "on other surfaces", "by the printed tables"]
+    assert faster[1].text == "holds in part, 6 of 10"
+    assert faster[3].text == "holds, 58 of 58"
+    assert [entry.text for entry in by_words["Holes become circles."][1:-1]] == ["-", "-", "-"]
+    verdicts = [row[1].text.partition(",")[0] for row in table.rows]
     assert verdicts.index("holds in part") < verdicts.index("holds")
-    assert verdicts.index("holds") < verdicts.index("not tested here")
+
+
+def test_the_printed_tables_are_a_control_that_refutes_three_claims(found):
+    """The counts are of Tables 2 to 4 alone, of the models that have all three algorithms."""
+    control = {name: claim.parts.get("printed") for name, claim in found.items()}
+    assert control["energy-similar"].counted.startswith("12 of 18 ")
+    assert control["deviation-similar"].counted.startswith("17 of 18 ")
+    assert control["means-slightly-better"].counted.startswith("8 of 18 ")
+    assert control["more-than-80-percent"].counted.startswith("2 of 3")
+
+
+def test_a_claim_is_judged_on_models_and_on_stand_ins_apart(evidence):
+    """One record's surface is the model itself; stand-ins have no say on its verdict."""
+    one = "Chinese Vase"
+    records = tuple(
+        changed(r, mesh={"origin": "model", "non_delaunay_share": 0.1})
+        if r.mesh.paper_row == one
+        else r
+        for r in evidence.records
+    )
+    claim = claim_of(replace(evidence, records=records), "delaunay")
+    assert list(claim.parts) == ["model", "stand-in", "surface"]
+    assert claim.verdict == claim.parts["model"].verdict == "does not hold here"
+    assert claim.parts["stand-in"].verdict == "holds"
+    assert claim.figures.startswith("On 1 of the paper's models: does not hold here, 0 of 1 (")
+    assert "On 1 stand-in for a model: holds, 1 of 1 (" in claim.figures
+
+
+def test_a_stand_in_has_no_vote_beside_its_model(evidence):
+    twin = [
+        changed(r, cell={"mesh_hash": "f" * 64}, mesh={"origin": "model"})
+        for r in evidence.records
+        if r.mesh.paper_row == "Chinese Vase"
+    ]
+    claim = claim_of(replace(evidence, records=(*evidence.records, *twin)), "delaunay")
+    assert [claim.parts[one].counted for one in ("model", "stand-in")] == ["1 of 1", "1 of 1"]
+
+
+def test_figures_that_a_stand_in_was_fitted_to_decide_nothing(evidence):
+    fitted = tuple(
+        changed(r, mesh={"fitted": "fdm"}) if r.mesh.paper_row else r for r in evidence.records
+    )
+    for name in ("energy-similar", "deviation-similar", "means-slightly-better"):
+        assert "stand-in" in claim_of(evidence, name).parts
+        claim = claim_of(replace(evidence, records=fitted), name)
+        assert list(claim.parts) == ["printed"]
+        assert claim.verdict == "not tested here"
+    assert claim_of(replace(evidence, records=fitted), "always-faster").parts["stand-in"].counted
+
+
+def test_the_claims_in_short_say_what_holds_on_the_models_first(evidence, found):
+    models = tuple(
+        changed(r, mesh={"origin": "model"}) if r.mesh.paper_row else r for r in evidence.records
+    )
+    table = in_short(claims(replace(evidence, records=models), {}))
+    heads = [row[0].text.split(" ", 1)[1] for row in table.rows]
+    assert heads[0] == "hold on the paper's models"
+    assert "are not borne out by the paper's own tables" in heads
+    assert heads[-1] == "could not be tested"
+    numbers = {row[0].text.split(" ", 1)[1]: int(row[0].text.split()[0]) for row in table.rows}
+    assert numbers["are not borne out by the paper's own tables"] == 5
 
 
 def test_the_share_of_a_claim_has_an_interval_over_families():
@@ -88,8 +151,8 @@ def test_the_share_of_a_claim_has_an_interval_over_families():
 
 
 def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
-    clean = "Before the repair, 0 triangles are folded on 0 of 3 surfaces; in the maps that are "
-    assert found["no-folding"].figures.startswith(clean)
+    clean = "Before the repair, 0 triangles are folded on 0 of 2 surfaces; in the maps that are "
+    assert found["no-folding"].parts["stand-in"].figures.startswith(clean)
     vase = next(s for s in evidence.surfaces if s.paper_row == "Chinese Vase")
 
     def with_folds(record):
@@ -99,10 +162,10 @@ def test_folds_before_the_repair_count_in_the_claim_on_folding(evidence, found):
 
     records = tuple(map(with_folds, evidence.records))
     claim = claim_of(replace(evidence, records=records), "no-folding")
-    told = f"119 triangles are folded on 1 of 3 surfaces ({vase.title}ˢ: 119)"
-    assert claim.figures == (
+    told = f"119 triangles are folded on 1 of 2 surfaces ({vase.title}ˢ: 119)"
+    assert claim.parts["stand-in"].figures == (
         f"Before the repair, {told}; in the maps that are compared, 0 triangles are folded on 0 of "
-        "3 surfaces."
+        "2 surfaces."
     )
     assert claim.verdict == "holds in part"
 
@@ -158,7 +221,8 @@ def test_a_claim_on_speed_is_decided_on_the_surfaces_that_have_the_rounds(eviden
 
     claim = claim_of(with_seconds(evidence, seconds_of), "always-faster")
     assert claim.verdict == "holds"
-    assert "FDM: 1 of 1, lowest rate 17.00, sign test over families p = 1" in claim.figures
+    assert "FDM: 1 of 1, lowest rate 17.00; too few" in claim.figures
+    assert "p = " not in claim.figures  # the table of certainty has the one test
     assert claim.figures.count("; too few rounds on 1 more") == 2  # QIEM failed there
     average = claim_of(with_seconds(evidence, seconds_of), "average-rates")
     assert average.verdict == "holds"  # 7 for QIEM, where 6.6 is printed for that model
@@ -195,7 +259,8 @@ def test_seconds_on_large_surfaces_need_rounds_too(evidence):
 
     some = large({"Chinese Vase": 1, "Liu's Neutral Face": 6, "": 1})
     assert some.verdict == "holds"
-    assert some.figures.endswith("with 200,000: 0.500 s; too few rounds on 2 more.")
+    assert some.parts["stand-in"].figures.endswith("200,000: 0.500 s; too few rounds on 1 more.")
+    assert some.parts["surface"].verdict == "too few rounds"
     none = large({"Chinese Vase": 1, "Liu's Neutral Face": 1, "": 1})
     assert none.verdict == "too few rounds"
 
@@ -224,7 +289,7 @@ def test_the_four_faces_are_judged_from_the_stored_maps(found, inspections, evid
     claim = found["below-one-degree"]
     (surface,) = (s for s in evidence.models if s.paper_row == "Liu's Neutral Face")
     share = inspections[surface.mesh_hash].angles["CEM"].below_one
-    assert claim.figures.startswith(f"Liu's Neutral Faceˢ: {100 * share:.1f} %")
+    assert claim.figures.startswith(f"Liu's Neutral Faceˢ: {100 * share:.1f} %; of all 2, ")
     assert all(seen.angles["CEM"].agrees for seen in inspections.values())
 
 
@@ -302,14 +367,16 @@ def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
     pulled[hole] = uv[hole].mean() + 1.2 * (uv[hole] - uv[hole].mean()).real
     pulled[hole] += 1j * (uv[hole] - uv[hole].mean()).imag
     koebe = load_registry().algorithm("koebe-cem")
+    printed = {"patches": "fans", "weights": "plane"}
     about = {"title": koebe.title, "target": koebe.target, "mesh": evidence.records[0].mesh}
     records = []
     for code, z in (("c", uv), ("d", pulled)):
         metrics = all_metrics(mesh, z)
         off = {"circularity_before_rounding": metrics["boundary_circularity"]}
+        cell = {"code_hash": code, "mesh": "holes", "mesh_hash": mesh.hash, "parameters": printed}
         records.append(
             changed(
-                record_of(algorithm="koebe-cem", code_hash=code, mesh="holes", mesh_hash=mesh.hash),
+                record_of(algorithm="koebe-cem", **cell),
                 outcome={"status": "ok", "metrics": metrics, "extras": off},
                 **about,
             )
@@ -321,4 +388,9 @@ def test_the_row_on_circular_holes_is_judged_by_the_records(evidence):
     ):
         claim = claim_of(replace(evidence, records=tuple(chosen)), "circular-holes")
         assert claim.verdict == verdict
-        assert "holes: up to " in claim.figures
+        assert "as printed: holes: up to " in claim.figures
+    own = {"parameters": {"patches": "disks", "weights": "surface"}}
+    other = [changed(r, cell=own) for r in records]
+    claim = claim_of(replace(evidence, records=tuple(other)), "circular-holes")
+    assert claim.verdict == "not tested here"
+    assert "as printed: not in this run" in claim.figures

@@ -103,6 +103,8 @@ def test_cost_is_shown_by_policy_beside_the_printed(evidence):
     assert titles == [
         "measured here, solves: reuse",
         "measured here, solves: backslash",
+        "measured here, solves: reuse, free boundary",
+        "measured here, solves: backslash, free boundary",
         "printed in the paper (Table 1)",
     ]
 

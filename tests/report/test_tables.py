@@ -142,12 +142,21 @@ def test_averages_of_known_rates():
 
 
 def test_aggregates_run_over_what_was_measured_and_say_their_n(evidence):
-    assert measured_rates(evidence, "qiem", "reuse") == {"Liu's Neutral Face": pytest.approx(7.0)}
-    assert [*measured_rates(evidence, "ldm", "reuse").values()] == pytest.approx([-0.5, 0.0])
-    table = averages_table(evidence, 2, "reuse")
+    assert measured_rates(evidence, "qiem", "reuse", "stand-in") == {
+        "Liu's Neutral Face": pytest.approx(7.0)
+    }
+    assert [*measured_rates(evidence, "ldm", "reuse", "stand-in").values()] == pytest.approx(
+        [-0.5, 0.0]
+    )
+    table = averages_table(evidence, 2, "reuse", "stand-in")
     counts = table.rows[-1]
     assert [v.number for v in counts[1:]] == [None, 20, 1, 1, None, 18, 2, 2, None, 20, 2, 2]
-    footer = by_name(printed_tables(evidence, 2))["table-2"].rows[-1]
+    made = by_name(printed_tables(evidence, 2))
+    assert [name for name in made if "averages" in name and "backslash" not in name] == [
+        "averages-on-stand-ins"
+    ]
+    assert measured_rates(evidence, "ldm", "reuse", "model") == {}
+    footer = made["table-2"].rows[-1]
     assert footer[0].text == "n, surfaces counted"
     assert [v.number for v in footer[2:]] == [2, 1, 2, 2, 2, 2]
 
@@ -163,10 +172,10 @@ def test_factorisations_stand_beside_the_averages_of_speedups(evidence):
         )
         return changed(record, outcome={"work": work})
 
-    plain = averages_table(evidence, 2, "reuse")
+    plain = averages_table(evidence, 2, "reuse", "stand-in")
     assert not any("factorisations" in row[0].text for row in plain.rows)
     known = Evidence(evidence.store, tuple(map(counted, evidence.records)), evidence.exhibits)
-    table = averages_table(known, 2, "reuse")
+    table = averages_table(known, 2, "reuse", "stand-in")
     (row,) = (row for row in table.rows if "factorisations" in row[0].text)
     by_name = dict(zip([(c.group, c.title) for c in table.columns], row, strict=True))
     assert by_name["QIEM", "here"].number == pytest.approx(8)
@@ -189,7 +198,7 @@ def test_both_ways_of_solving_stand_side_by_side(evidence):
     row = next(r for r in table.rows if r[0].text == "Chinese Vase")
     cem = [v.number for c, v in zip(table.columns, row, strict=True) if c.group == "CEM"]
     assert cem == [1.0, 2.0, 2.0]
-    rates = measured_rates(evidence, "fdm", "backslash").values()
+    rates = measured_rates(evidence, "fdm", "backslash", "stand-in").values()
     assert [*rates] == pytest.approx([0.5, 2.0])
 
 
@@ -212,9 +221,10 @@ def test_a_model_counts_once_itself_before_its_stand_in(tmp_path):
     evidence = Evidence.of(tmp_path)
     assert [s.name for s in evidence.models if s not in evidence.one_per_model] == ["spherical-cap"]
     assert evidence.surface_for_model("Liu's Neutral Face").origin == "model"
-    rates = measured_rates(evidence, "ldm", "reuse")
-    assert rates["Liu's Neutral Face"] == pytest.approx(7.0)
-    assert len(rates) == 2
+    assert measured_rates(evidence, "ldm", "reuse", "model") == {
+        "Liu's Neutral Face": pytest.approx(7.0)
+    }
+    assert len(measured_rates(evidence, "ldm", "reuse", "stand-in")) == 1
     table = by_name(printed_tables(evidence, 2))["table-2"]
     assert len(table.rows) - table.footer_rows == 3
     _, counted = entry(table, "n, surfaces counted", "LDM", "here")

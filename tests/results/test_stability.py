@@ -22,7 +22,7 @@ def test_unstable_times_are_counted_with_what_ended_them():
         timed(FEW, "budget"),
     ]
     assert stability_words(records) == (
-        "3 of 7 times are unstable (95 % interval wider than 10% of the figure): 2 as the maximum "
+        "3 of 7 times are unstable (95 % interval wider than 25% of the figure): 2 as the maximum "
         "number of rounds was reached, 1 as the time was used up; 2 of them measured beside other "
         "work. 1 has too few rounds for an interval: the time was used up."
     )

@@ -23,8 +23,8 @@ from cembench.results.columns import COLUMNS, DERIVED, family_of
 from cembench.results.comparison import Comparison, compare, latest
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
-from cembench.results.papers import Paper, papers, usual_paper
-from cembench.results.records import REFERENCE, Cell, MeshOrigin, Record
+from cembench.results.papers import NO_PAPER, Paper, paper_of, papers, usual_paper
+from cembench.results.records import REFERENCE, USUAL_REFERENCES, Cell, MeshOrigin, Record
 from cembench.results.store import Store
 
 if TYPE_CHECKING:
@@ -81,6 +81,11 @@ class MeasuredSurface:
     def title(self) -> str:
         """The paper's name of the model, or the surface's own name."""
         return self.paper_row or self.name
+
+    @property
+    def full_title(self) -> str:
+        """The title; of a stand-in, which shows another surface, with the word."""
+        return f"{self.title} (stand-in)" if self.origin == "stand-in" else self.title
 
 
 @dataclass(frozen=True)
@@ -168,9 +173,11 @@ class Evidence:
         and `surface` (its title), `place` (its number in the report), `label` and `series` (its
         number), `main`, and `ok`; `model` (of the paper), `counted` (the one surface for its
         model), `once` (the same, or of no model), `printed` (an algorithm of the paper), and
-        `reference`; `as_good`: about as good as the best map to the disk there; and of the
-        comparison with the reference's main parameters `comparison`, `speedup` with its interval,
-        `verdict`, `ratio`, and `paired`, the rounds with both.
+        `reference`; `contest`, the name of target and policy, with rivals or not (`contested`),
+        and `to`, the words for a target that is not the disk; `as_good`: about as good as the
+        best map to the same target there; and of the comparison with the main parameters of the
+        contest's reference `comparison`, `speedup` with its interval, `verdict`, `ratio`, and
+        `paired`, the rounds with both.
         """
         import pandas as pd
 
@@ -184,6 +191,9 @@ class Evidence:
             figures = dict.fromkeys(COLUMNS) | self.row(record)
             figures |= {column.name: column.of(record) for column in DERIVED}
             about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
+            about["contest"] = self.contest_name(own.target, record.cell.solves)
+            about["contested"] = own.target in self.contests
+            about["to"] = "" if own.target == DISK else f", {own.target}"
             more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
             more["model"], more["origin"] = surface.paper_row or None, surface.origin
             more["counted"] = surface in counted
@@ -195,9 +205,9 @@ class Evidence:
         rows.sort(key=lambda row: (row["place"], row["series"], order[str(row["solves"])]))
         frame = pd.DataFrame(rows)
         frame = frame.astype(dict.fromkeys(frame.columns[frame.isna().all()], float))
-        disks = frame[frame["ok"] & (frame["target"] == DISK)]
-        best = disks.groupby(["place", "solves"])[ANGLE].transform("min")
-        good = (disks[ANGLE] <= AS_GOOD * best) | (disks[ANGLE] <= best + DEGREES)
+        maps = frame[frame["ok"]]
+        best = maps.groupby(["place", "solves", "target"])[ANGLE].transform("min")
+        good = (maps[ANGLE] <= AS_GOOD * best) | (maps[ANGLE] <= best + DEGREES)
         # The copy holds columns of a type together: rows are taken in half the time.
         return frame.copy().assign(as_good=good.reindex(frame.index, fill_value=False))
 
@@ -340,6 +350,8 @@ class Evidence:
                 elif titles[title] > 1 and target != DISK:
                     title = f"{title} ({target})"
                 title = in_lists(title)
+                if k == 0 and name in self._as_printed:
+                    title = f"{title} (as the paper ran it)"
                 label = title if k == 0 else f"{title} ({difference(choice, choices[0])})"
                 series.append(AlgorithmSeries(name, title, target, choice, label, main=k == 0))
         return tuple(series)
@@ -350,8 +362,42 @@ class Evidence:
 
     @property
     def disk_series(self) -> tuple[AlgorithmSeries, ...]:
-        """The series that map to the unit disk; only these are compared with each other."""
-        return tuple(s for s in self.series if s.target == DISK)
+        """The series that map to the unit disk."""
+        return self.series_to(DISK)
+
+    def series_to(self, target: str) -> tuple[AlgorithmSeries, ...]:
+        """Return the series of a target; only these are compared with each other."""
+        return tuple(s for s in self.series if s.target == target)
+
+    @cached_property
+    def targets(self) -> tuple[str, ...]:
+        """The targets of the run's maps, the disk first."""
+        return tuple(sorted({s.target for s in self.series}, key=lambda t: (t != DISK, t)))
+
+    @cached_property
+    def contests(self) -> tuple[str, ...]:
+        """The targets that at least two algorithms map to: each is a contest of its own."""
+        number = Counter(s.target for s in self.series if s.main)
+        return tuple(target for target in self.targets if number[target] > 1)
+
+    def contest_name(self, target: str, policy: str) -> str:
+        """Return the name of a target under a policy, without the target if it is the disk."""
+        return policy if target == DISK else f"{policy}, {target}"
+
+    @property
+    def contest_names(self) -> list[str]:
+        """The names of all targets and policies."""
+        return [self.contest_name(t, policy) for t in self.targets for policy in self.policies]
+
+    def reference_to(self, target: str) -> AlgorithmSeries | None:
+        """Return the series that those of a target are compared with.
+
+        It is the run's reference if that maps there, else the usual one of the target, else the
+        first.
+        """
+        own = {s.algorithm: s for s in self.series_to(target) if s.main}
+        wanted = (self.reference, USUAL_REFERENCES.get(target, ""), *own)
+        return next((own[name] for name in wanted if name in own), None)
 
     @cached_property
     def _index(self) -> dict[tuple[str, str, Variant, str], Record]:
@@ -376,12 +422,22 @@ class Evidence:
         differing = {}
         for r in self.records:
             name, own = r.cell.algorithm, variants[r.cell.key]
-            usual = _variant(r.cell, self.paper.as_elsewhere(name, r.cell.parameters))
+            of_model = paper_of(r.mesh.paper_row) if r.mesh.origin == "model" else NO_PAPER
+            usual = _variant(r.cell, of_model.as_elsewhere(name, r.cell.parameters))
             separate = (name, usual, r.cell.mesh_hash) in chosen or any(
                 (name, own, origin) in chosen for origin in ("stand-in", "surface")
             )
             differing[r.cell.key] = own if r.mesh.origin != "model" or separate else usual
         return differing
+
+    @cached_property
+    def _as_printed(self) -> set[str]:
+        """The algorithms whose cells on models are as a paper ran them, in the usual series."""
+        return {
+            r.cell.algorithm
+            for r in self.records
+            if self._variants[r.cell.key] != _variant(r.cell, r.cell.parameters)
+        }
 
     @cached_property
     def styles(self) -> dict[str, SeriesStyle]:
@@ -393,12 +449,14 @@ class Evidence:
         self, surface: MeasuredSurface, series: AlgorithmSeries, policy: str | None = None
     ) -> Record | None:
         """Return an algorithm's record on a surface; without a policy, the first that is ok."""
-        held = [
-            self._index.get((surface.mesh_hash, series.algorithm, series.variant, p))
-            for p in ([policy] if policy else self.policies)
-        ]
+        chosen = [policy] if policy else self.policies
+        held = [self.find_exactly(surface.mesh_hash, series, one) for one in chosen]
         there = [record for record in held if record is not None]
         return next((r for r in there if r.outcome.status == "ok"), there[0] if there else None)
+
+    def find_exactly(self, mesh_hash: str, series: AlgorithmSeries, policy: str) -> Record | None:
+        """Return the record of an algorithm on a surface under a policy; None without one."""
+        return self._index.get((mesh_hash, series.algorithm, series.variant, policy))
 
     def series_of(self, algorithm: str) -> AlgorithmSeries | None:
         """Return the main series of an algorithm; None if the run has none."""
@@ -410,9 +468,9 @@ class Evidence:
 
     @cached_property
     def comparisons(self) -> dict[str, Comparison]:
-        """The comparisons of times with the reference, by key; none without both times.
+        """The comparisons of times with :meth:`reference_to`, by key; none without both times.
 
-        It is the reference with its main parameters on the same surface and with the same policy.
+        It has its main parameters, on the same surface and with the same policy.
         """
         pairs = ((record, self.base(record)) for record in self.records)
         compared = {one.cell.key: compare(one, base) for one, base in pairs if base is not None}
@@ -437,11 +495,9 @@ class Evidence:
         return None if comparison is None else comparison.speedup
 
     def base(self, record: Record) -> Record | None:
-        """Return the reference's record for comparing times; None for that record itself."""
-        reference = self.series_of(self.reference)
-        base = reference and self._index.get(
-            (record.cell.mesh_hash, self.reference, reference.variant, record.cell.solves)
-        )
+        """Return the record of the contest's reference; None for that record itself."""
+        reference = self.reference_to(record.target)
+        base = reference and self.find_exactly(record.cell.mesh_hash, reference, record.cell.solves)
         return None if not base or base.cell.key == record.cell.key else base
 
     def name_of(self, surface: MeasuredSurface) -> str:

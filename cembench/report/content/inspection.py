@@ -116,17 +116,17 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
             f"{slugs[digest(series.label)]}-checkerboard",
             [painter.paint(p, painter.checkerboard(p, board), folded) for p in (space, image)],
             title=series.label,
-            caption=f"{surface.title}, {about}",
-            alternative=f"{surface.title} and its image by {series.label} under one checkerboard",
+            caption=f"{surface.full_title}, {about}",
+            alternative=f"{surface.full_title} and its image by {series.label} under one "
+            "checkerboard",
             record=record.cell.key,
         )
-        if series.target == DISK:
-            angles[series.label] = _angles(mesh, uv, record)
+        angles[series.label] = _angles(mesh, uv, record)
         if shown is None or (series.algorithm == evidence.reference and series.main):
             shown = (series, image, folded)
     if shown is None:
         return Inspection(surface, kept=True)
-    of = f"{surface.title} and its image by {shown[0].label}"
+    of = f"{surface.full_title} and its image by {shown[0].label}"
     panels, H = ((space, None), shown[1:]), mean_curvature(mesh)
     curved = write(
         "curvature",
@@ -144,7 +144,7 @@ def inspect_surface(evidence: Evidence, folder: Path, surface: MeasuredSurface) 
         alternative=f"{of}, with their edges",
     )
     most = triangles_per_surface([s.faces for s in evidence.surfaces])
-    scene = view_scene(mesh, viewed, surface.title, most)
+    scene = view_scene(mesh, viewed, surface.full_title, most)
     return Inspection(surface, True, checkerboards, curved, meshed, angles, scene)
 
 

@@ -7,11 +7,12 @@ from itertools import combinations
 from math import inf
 from pathlib import Path
 
+from cembench.core.names import slug
 from cembench.report.by_surface import policy_suffix
 from cembench.report.content.causes import worst_table
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, MeasuredSurface
-from cembench.report.content.findings import surfaces_words
 from cembench.report.content.inspection import Inspection
+from cembench.report.content.standings import surfaces_words
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
@@ -107,19 +108,25 @@ SAME = 1e-6
 
 
 def pairwise_wins(evidence: Evidence, policy: str) -> list[Table]:
-    """Return tables of angles and seconds for maps to the disk, if there are several."""
-    suffix = policy_suffix(policy, evidence)
-    made = (
-        _table(evidence, f"wins-angles{suffix}", "Who has the smaller angle errors", policy, ANGLE),
-        _table(evidence, f"wins-seconds{suffix}", "Who is faster", policy, "seconds"),
-    )
-    return [table for table in made if table is not None]
+    """Return tables of angles and seconds for each target with several algorithms."""
+    tables = []
+    for target in evidence.contests:
+        suffix = policy_suffix(policy, evidence) + f"-{slug(target)}" * (target != DISK)
+        to = f", {target}" * (target != DISK)
+        for figure, name, title in (
+            (ANGLE, "wins-angles", "Who has the smaller angle errors"),
+            ("seconds", "wins-seconds", "Who is faster"),
+        ):
+            tables.append(_table(evidence, name + suffix, title + to, policy, figure, target))
+    return [table for table in tables if table is not None]
 
 
-def _table(evidence: Evidence, name: str, title: str, policy: str, figure: str) -> Table | None:
+def _table(
+    evidence: Evidence, name: str, title: str, policy: str, figure: str, target: str
+) -> Table | None:
     frame = evidence.frame
-    tried = frame[frame["main"] & (frame["target"] == DISK) & (frame["solves"] == policy)]
-    series = [s for s in evidence.disk_series if s.label in set(tried["label"])]
+    tried = frame[frame["main"] & (frame["target"] == target) & (frame["solves"] == policy)]
+    series = [s for s in evidence.series_to(target) if s.label in set(tried["label"])]
     if len(series) < 2:
         return None
     cost = tried[figure].where(tried["ok"]).fillna(inf)

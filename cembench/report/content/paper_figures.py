@@ -93,7 +93,7 @@ def _pictures(evidence: Evidence, inspections: Inspections, wanted: Picture) -> 
     return [
         Figure(
             f"{figure.lower().replace(' ', '-')}-{k + 1}",
-            f"{model} ({surface.origin}) and its map by {series.label}: {picture.title}",
+            f"{surface.full_title} and its map by {series.label}: {picture.title}",
             picture.files,
             picture.caption,
             alternative=picture.alternative,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from cembench.core.names import slug
 from cembench.report.by_surface import POLICIES, policy_suffix
-from cembench.report.content.evidence import Evidence
+from cembench.report.content.evidence import DISK, Evidence
 from cembench.report.declared import declared_table
 from cembench.report.document import Gap, Table
 from cembench.results.columns import counted
@@ -43,7 +44,19 @@ def work_tables(evidence: Evidence) -> list[Table]:
 
 
 def sure_speedups(evidence: Evidence, policy: str) -> list[Table]:
-    """Return a table on the certainty of the speedups; none without comparable rounds."""
-    called = f"sure-speedups{policy_suffix(policy, evidence)}"
-    made = declared_table(evidence, "sure-speedups", called=called, policy=policy)
-    return [made] if made else []
+    """Return a table for each target on the certainty of speedups, where rounds are comparable."""
+    frame, tables = evidence.frame, []
+    for target in evidence.targets:
+        base = evidence.reference_to(target)
+        other = target != DISK
+        made = declared_table(
+            evidence,
+            "sure-speedups",
+            called=f"sure-speedups{policy_suffix(policy, evidence)}{f'-{slug(target)}' * other}",
+            policy=policy,
+            keys=frame["key"][frame["target"] == target],
+            reference=base.label if base else "",
+            to=f", {target}" * other,
+        )
+        tables.append(made)
+    return [table for table in tables if table]

@@ -9,7 +9,7 @@ every model equally.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -27,6 +27,7 @@ from cembench.report.content.policies import sure_speedups
 from cembench.report.document import Column, Table, entry, missing, words
 from cembench.results.columns import COLUMNS, FrameColumn, worded
 from cembench.results.papers import Paper
+from cembench.results.records import MeshOrigin
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -39,6 +40,11 @@ READINGS = (
     Footer(label="mean of the savings", value="mean(1 - 1 / (1 + x))", form="percent"),
 )
 MEAN_RATE = READINGS[0]
+#: The origins of surfaces that are averaged apart, the models first.
+ON: Mapping[MeshOrigin, str] = {
+    "model": "on the paper's models",
+    "stand-in": "on stand-ins for its models",
+}
 
 
 def printed_tables(evidence: Evidence, number: int) -> list[Table]:
@@ -50,7 +56,9 @@ def printed_tables(evidence: Evidence, number: int) -> list[Table]:
     for policy in evidence.policies if table.by_policy or table.compares else (None,):
         made += _printed_table(evidence, number, policy)
         if table.compares and policy:
-            made += [averages_table(evidence, number, policy)] if evidence.models else []
+            here = {surface.origin for surface in evidence.one_per_model}
+            origins = [origin for origin in ON if origin in here]
+            made += [averages_table(evidence, number, policy, one) for one in origins]
             made += sure_speedups(evidence, policy)
     return made
 
@@ -122,8 +130,11 @@ def absent_models(evidence: Evidence) -> list[str]:
     return [model for model in evidence.paper.models if model not in there]
 
 
-def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
-    """Return both readings of the averages: stated, printed for all or these models, measured."""
+def averages_table(evidence: Evidence, number: int, policy: str, origin: MeshOrigin) -> Table:
+    """Return both readings of the averages on surfaces of an origin.
+
+    Stated, printed for all models or for these, measured.
+    """
     paper = evidence.paper
     titles = ("stated", "printed, all", "printed, these", "here")
     columns = [Column(title, a.upper()) for a in paper.compared for title in titles]
@@ -131,14 +142,14 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
     rows, counts, work = [], [words("n, models counted")], []
     sets = {}
     for a in paper.compared:
-        measured = measured_rates(evidence, a, policy)
+        measured = measured_rates(evidence, a, policy, origin)
         sets[a] = (
             printed_rates(paper, a),
             printed_rates(paper, a, list(measured)),
             [*measured.values()],
         )
         counts += [words(""), *(entry(len(rates), "d", "") for rates in sets[a])]
-        work.append(work_ratios(evidence, a, policy))
+        work.append(work_ratios(evidence, a, policy, origin))
     for k, reading in enumerate(READINGS):
         cells = [words(reading.label)]
         for a in paper.compared:
@@ -154,7 +165,6 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
             cells += [missing("the paper does not count them")] * 3
             cells.append(tenths.entry(ratios, "not counted"))
         rows.append(tuple(cells))
-    origins = ", ".join(sorted({s.origin for s in evidence.models}))
     replaced = (
         f"the misprint ({model}, {algorithm.upper()}) is replaced by the {rate:.2f} that Table "
         f"{paper.table_of('seconds')} gives"
@@ -162,8 +172,9 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
         if table == number and (rate := corrected_rate(paper, model, algorithm)) is not None
     )
     return Table(
-        name=f"averages{policy_suffix(policy, evidence)}",
-        title=f"Averages of Table {number}, in both readings{in_policy(evidence, policy)}",
+        name=f"averages-on-{origin}s{policy_suffix(policy, evidence)}",
+        title=f"Averages of Table {number} {ON[origin]}, in both readings"
+        f"{in_policy(evidence, policy)}",
         columns=(Column("reading", numeric=False), *columns),
         rows=(*rows, tuple(counts)),
         caption=(
@@ -174,8 +185,7 @@ def averages_table(evidence: Evidence, number: int, policy: str) -> Table:
         ),
         notes=(
             *replaced,
-            f"measured on: {origins}; {len(absent_models(evidence))} of the paper's "
-            "models are not in this run",
+            f"{len(absent_models(evidence))} of the paper's models are not in this run",
         ),
         footer_rows=1,
     )
@@ -198,23 +208,28 @@ def corrected_rate(paper: Paper, model: str, algorithm: str) -> float | None:
     return None if ours is None or theirs is None else theirs / ours - 1
 
 
-def measured_rates(evidence: Evidence, algorithm: str, policy: str) -> dict[str, float]:
-    """Return the rates of speedup over an algorithm by model, those of one surface for each."""
+def measured_rates(
+    evidence: Evidence, algorithm: str, policy: str, origin: MeshOrigin
+) -> dict[str, float]:
+    """Return the rates of speedup over an algorithm on surfaces of an origin, by model."""
     known = measured(evidence, algorithm, policy).dropna(subset="speedup")
+    known = known[known["origin"] == origin]
     return dict(zip(known["model"], known["speedup"], strict=True))
 
 
 def measured(evidence: Evidence, algorithm: str, policy: str) -> pd.DataFrame:
-    """Return the records of an algorithm on one surface for each model of the paper."""
-    frame = evidence.frame
+    """Return the records of an algorithm on one surface for each model with a printed rate."""
+    frame, paper = evidence.frame, evidence.paper
     rows = frame[frame["counted"] & frame["main"] & (frame["algorithm"] == algorithm)]
-    return rows[rows["solves"] == policy]
+    in_print = [m for m in paper.models if corrected_rate(paper, m, algorithm) is not None]
+    return rows[(rows["solves"] == policy) & rows["model"].isin(in_print)]
 
 
-def work_ratios(evidence: Evidence, algorithm: str, policy: str) -> list[float]:
+def work_ratios(evidence: Evidence, algorithm: str, policy: str, origin: MeshOrigin) -> list[float]:
     """Return an algorithm's numeric factorisations over CEM's, of the models that count."""
     frame = evidence.frame
     rows = frame[frame["counted"] & frame["main"] & (frame["solves"] == policy)]
+    rows = rows[rows["origin"] == origin]
     work = rows.pivot(index="place", columns="algorithm", values="counted_factorisations")
     if not {algorithm, evidence.reference} <= set(work):
         return []

@@ -10,13 +10,19 @@ from pathlib import Path
 
 from cembench.core.version import installed_version
 from cembench.report.content import many_surfaces, policies
-from cembench.report.content.claims import at_a_glance, claims
+from cembench.report.content.claims import at_a_glance, claims, in_short
 from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.exhibits import exhibit_sections
-from cembench.report.content.findings import findings, many_findings, surfaces_words
+from cembench.report.content.findings import findings, many_findings
 from cembench.report.content.inspection import Inspection, inspect_surface
 from cembench.report.content.paper_figures import OF_MODELS, figures_section, paper_plot
 from cembench.report.content.printed_tables import printed_tables
+from cembench.report.content.standings import (
+    contest_words,
+    contests_of,
+    rank_tables,
+    surfaces_words,
+)
 from cembench.report.content.surface_page import figures_table, surface_page
 from cembench.report.declared import declared_table, own_tables
 from cembench.report.declared_plots import declared_plot
@@ -39,6 +45,7 @@ from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
 from cembench.results.machines import machine_of, software_differences
 from cembench.results.records import MeshOrigin
+from cembench.results.stability import scatter_words
 
 
 def machines_section(evidence: Evidence) -> Section | None:
@@ -83,7 +90,7 @@ def _table(evidence: Evidence) -> Table:
 Progress = Callable[[str, int, int], None]
 
 #: The title of a paper's report goes before this.
-PAPER = ": its claims, tables and figures, measured"
+PAPER = ": measured again"
 #: Names of plots for the head, the first that is there: accuracy against time, or its profiles.
 FIRST_PLOTS = ("accuracy-against-time", "accuracy-profiles")
 
@@ -323,7 +330,7 @@ def _tables(run: _Run) -> Section | None:
 
 def _claims(run: _Run) -> Section:
     tested = claims(run.evidence, run.seen)
-    glance = [at_a_glance(tested)] if tested else []
+    glance = [in_short(tested), at_a_glance(tested)] if tested else []
     return Section("claims", "Claims of the paper", (*glance, *tested))
 
 
@@ -351,7 +358,11 @@ def _certain(run: _Run) -> list[Item]:
 
 def _beyond_the_paper(run: _Run) -> Section:
     both = _policies(run) or [policies.one_policy_gap(run.evidence)]
-    items = (*run.plots(*_TIMES), *both, *_beside(run))
+    contests = contests_of(run.evidence, run.evidence.policies[0])
+    ranks: list[Item] = [Text(contest_words(one)) for one in contests]
+    ranks += rank_tables(contests)
+    scattered = [Text(words) for words in [scatter_words(run.evidence.records)] if words]
+    items = (*ranks, *scattered, *run.plots(*_TIMES), *both, *_beside(run))
     return Section("beyond", "Beyond the paper", items)
 
 

@@ -44,7 +44,7 @@ def surface_page(
         command = "repeat the command of the run: it adds the surfaces and measures nothing twice"
         items.append(Gap("Pictures", f"{seen.missing_reason}.", command))
     items.append(figures_table(evidence, surface, name))
-    section = Section(f"surface-{name}", surface.title, tuple(items), page=True)
+    section = Section(f"surface-{name}", surface.full_title, tuple(items), page=True)
     plot = declared_plot(
         evidence, "surface", seen={surface.mesh_hash: seen}, surface=surface, called=f"{name}-plots"
     )
@@ -73,6 +73,8 @@ def figures_table(evidence: Evidence, surface: MeasuredSurface, name: str) -> Ta
     """Return a table of all figures of merit on one surface, one row per cell."""
     keys = [r.cell.key for r in evidence.records if r.cell.mesh_hash == surface.mesh_hash]
     called = f"figures-{name}"
-    table = declared_table(evidence, "figures", keys=keys, called=called, surface=surface.title)
+    table = declared_table(
+        evidence, "figures", keys=keys, called=called, surface=surface.full_title
+    )
     assert table is not None, "a surface has records"
     return table

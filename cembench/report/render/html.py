@@ -29,6 +29,7 @@ import jinja2
 from markupsafe import Markup, escape
 
 from cembench.core.atomic import write_text
+from cembench.core.extras import Extra, missing
 from cembench.core.names import in_lists
 from cembench.report.document import (
     ORIGINS,
@@ -126,7 +127,7 @@ def write_html(report: Report, folder: Path) -> Path:
     """Write `index.html`, the whole report in one file, and return its path.
 
     Pictures and data are read from the files that the figures name, relative to `folder`. The same
-    report gives the same bytes.
+    report gives the same bytes. Without Plotly (the extra "report") plots stay pictures.
 
     Raises
     ------
@@ -152,7 +153,8 @@ def render(report: Report, folder: Path) -> str:
     )
     keys = _short_keys(report.records)
     facets = facets_of(report.records)
-    plots = {anchors.of(f): _plot(f.plot) for f in figures if f.plot is not None}
+    interactive = not missing(Extra.REPORT)
+    plots = {anchors.of(f): _plot(f.plot) for f in figures if f.plot is not None and interactive}
     script = template_text("unpack.js") + template_text("report.js")
     style = template_text("report.css")
     if any(gallery.scene for gallery in items_of(report, Gallery)):

@@ -247,11 +247,14 @@ def _head(report: Report) -> Iterator[RenderableType]:
         yield Line(f"{report.paper.authors}. {report.paper.place}. doi:{report.paper.doi}")
     findings = report.findings
     if findings is not None:
-        yield from (Line(f"\n{plain(sentence)}") for sentence in findings.sentences)
-        yield Line()
+        tables: list[RenderableType] = [
+            folded(bare) if all(c.group for c in bare.columns[2:]) else bare
+            for bare in (replace(table, caption="", notes=()) for table in findings.tables)
+        ]
+        lines = [Line(f"\n{plain(sentence)}") for sentence in findings.sentences]
+        yield from (*lines[:1], Line(), *tables[:1], *lines[1:], Line())
+        yield from (part for table in tables[1:] for part in (table, Line()))
         yield from (Line(f"! {line}", STYLES["doubtful"]) for line in findings.suspects)
-        if findings.table is not None:
-            yield from (folded(replace(findings.table, caption="", notes=())), Line())
         for figure in findings.figures:
             line = Line.assemble((figure.number, "bold"), f"  {figure.words}")
             yield Padding(line, (0, 0, 0, 2), expand=False)
