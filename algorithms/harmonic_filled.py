@@ -19,7 +19,7 @@ from cembench.registry import algorithm
 @algorithm(
     "harmonic-filled",
     title="Harmonic, filled",
-    target="circular holes",
+    target="disk with holes",
     source="Eq. (10) on the filled surface; Floater & Hormann 2005, Sec. 3",
 )
 def harmonic_filled(
@@ -32,8 +32,9 @@ def harmonic_filled(
 
     The simple alternative to Koebe's method, and the baseline for it: every hole gets a fan to its
     centroid, and the outer boundary (that of the vertex `outer`, or the widest) keeps its arc
-    length on the unit circle. Nothing makes the holes round: the record's circularity measures how
-    far from circles they are. Folds are repaired on the filled surface (`fold_repairs`).
+    length on the unit circle. Nothing makes the holes round, so the target is a disk with holes of
+    any shape; the record's circularity measures how far from circles they are. Folds are repaired
+    on the filled surface (`fold_repairs`).
     """
     _, holes = mesh.outer_and_holes(outer)
     disk = filled(mesh, holes)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from cembench.conformal.free_boundary import pinned_map, two_distant_vertices, with_area_pi
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import algorithm
 
 
@@ -26,6 +26,13 @@ def lscm(mesh: DiskMesh, *, delaunay: bool = False, repair: bool = True) -> Para
     weights fold the interior, patches around the folds are laid out again (`fold_repairs`); if that
     does not help, as with a boundary that crosses itself, folds remain.
     """
+    return least_energy(mesh, delaunay=delaunay, repair=repair)
+
+
+def least_energy(
+    mesh: DiskMesh | HoledMesh, *, delaunay: bool = False, repair: bool = True
+) -> Parameterization:
+    """Return the map of :func:`lscm`, with the boundaries of holes free too."""
     pins = two_distant_vertices(mesh)
     uv = pinned_map(laplacian(mesh, delaunay=delaunay), mesh.loops, pins)
     uv, folds = with_area_pi(mesh, uv, repair=repair)

@@ -12,11 +12,11 @@ from typing import Any
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
 from cembench.conformal.metrics import angle_errors, boundary_circularity, flipped_triangles
-from cembench.conformal.planar import crossing_polygons
 from cembench.core.errors import AlgorithmFailed, MeshError, NotPositiveDefinite
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import load_registry
+from cembench.running.map_promises import faults
 
 NAMES = ("direct-cem-holes", "koebe-cem", "harmonic-filled")
 SUFFIXES = (".npz", ".obj", ".ply", ".off")
@@ -38,8 +38,9 @@ def holed_surfaces(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
     """Map every surface with holes below some folders by each algorithm, and judge the maps.
 
     The first table has the mean angle error of each valid map, in degrees; (n) after it is the
-    number of folds of the method's own map, ~ a map with holes that are not round. Other entries
-    are the folds that are left, or "crosses" or "failed".
+    number of folds of the method's own map, ~ a map with holes that are not round, which only
+    harmonic-filled may have. Other entries are the folds that are left, another broken promise, or
+    "failed".
     """
     surfaces = dict(holed_below(folders, faces))
     if not surfaces:
@@ -90,15 +91,14 @@ def outcome(mesh: HoledMesh, name: str) -> dict[str, Any]:
     except (AlgorithmFailed, NotPositiveDefinite):
         return {"valid": False, "told": "failed", "seconds": process_time() - begun}
     seconds = process_time() - begun
-    folds = flipped_triangles(mesh, made.uv)
-    crosses = crossing_polygons([made.uv[loop] for loop in mesh.loops]) is not None
+    folds, broken = flipped_triangles(mesh, made.uv), faults(algorithm, mesh, made.uv)
     angle = float(angle_errors(mesh, made.uv).mean())
     is_round = boundary_circularity(mesh, made.uv) < ROUND
     own = made.extras["folded_before_repair"]
     shown = f"{'' if is_round else '~ '}{angle:.2f}{f' ({own:,})' if own else ''}"
     return {
-        "valid": not folds and not crosses,
-        "told": f"{folds:,} folds" if folds else "crosses" if crosses else shown,
+        "valid": not broken,
+        "told": f"{folds:,} folds" if folds else shown if not broken else broken[0].kind,
         "angle": angle,
         "round": is_round,
         "resort": "last_resort" in made.extras,

@@ -48,7 +48,7 @@ from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 #: The kinds of image that an algorithm can produce; tables always keep them apart.
 #: An atlas has UVs at corners, not at vertices: the surface is cut into islands.
-Target = Literal["disk", "free boundary", "circular holes", "atlas"]
+Target = Literal["disk", "free boundary", "circular holes", "disk with holes", "atlas"]
 
 #: Finds the named landmarks of a family's mesh: name -> vertex, counted from 0.
 Landmarks = Callable[[TriangleMesh], Mapping[str, int]]
@@ -199,7 +199,7 @@ def algorithm(
         Name on the command line.
     title : str
         Name in table headings.
-    target : {"disk", "free boundary", "circular holes", "atlas"}
+    target : {"disk", "free boundary", "circular holes", "disk with holes", "atlas"}
         The kind of image; an atlas is returned as an `Atlas`.
     source : str
         Where the method was published.
@@ -287,7 +287,7 @@ def external_program(
         Name on the command line.
     title : str
         Name in table headings, which add that it is an external program.
-    target : {"disk", "free boundary", "circular holes", "atlas"}
+    target : {"disk", "free boundary", "circular holes", "disk with holes", "atlas"}
         The kind of image.
     command : str
         The command in shell notation, with ``{input}``, ``{output}`` and ``{PARAMETER}``; it is not
@@ -376,7 +376,7 @@ def _of_any(mesh: TriangleMesh) -> None:
 
 
 #: By target; other targets take disks.
-_TAKES = {"circular holes": _of_holes, "atlas": _of_any}
+_TAKES = {"circular holes": _of_holes, "disk with holes": _of_holes, "atlas": _of_any}
 
 
 def _program_name(command: str) -> str:

@@ -15,7 +15,7 @@ from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 
 Real = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -28,7 +28,7 @@ class Angles:
     unknowns are, for every interior vertex, one multiplier of its angle sum and one of its wheel.
     """
 
-    def __init__(self, mesh: DiskMesh) -> None:
+    def __init__(self, mesh: DiskMesh | HoledMesh) -> None:
         if not len(mesh.interior):
             raise AlgorithmFailed(
                 "the mesh has no interior vertex, so its angles have no constraints"
@@ -188,7 +188,12 @@ def kept_positive(angles: Real, e: Real) -> tuple[Real, float]:
 
 
 def placed(
-    mesh: DiskMesh, angles: Real, told: dict[str, Any], *, repair: bool, iterations: int = 0
+    mesh: DiskMesh | HoledMesh,
+    angles: Real,
+    told: dict[str, Any],
+    *,
+    repair: bool,
+    iterations: int = 0,
 ) -> Parameterization:
     """Place vertices by least squares conformal maps of triangles with these angles."""
     with phase("assembly"):

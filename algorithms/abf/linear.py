@@ -6,7 +6,7 @@ import numpy as np
 
 from cembench.conformal.free_boundary import is_strip, unrolled
 from cembench.core.parameterization import Parameterization
-from cembench.mesh.triangle_mesh import DiskMesh
+from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import algorithm
 
 from .constraints import Angles, kept_positive, placed
@@ -34,7 +34,12 @@ def abf_linear(mesh: DiskMesh, *, repair: bool = True) -> Parameterization:
     logarithm) are what remains of the constraints, since the step is linear. Folds inside are
     repaired as in LSCM (`fold_repairs`).
     """
-    if is_strip(mesh):
+    return linear_angles(mesh, repair=repair)
+
+
+def linear_angles(mesh: DiskMesh | HoledMesh, *, repair: bool = True) -> Parameterization:
+    """Return the map of :func:`abf_linear`, with the boundaries of holes free too."""
+    if isinstance(mesh, DiskMesh) and is_strip(mesh):
         return unrolled(mesh)
     problem = Angles(mesh)
     wanted = problem.wanted

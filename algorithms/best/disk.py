@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
-from time import perf_counter
 from typing import Annotated
 
 from pydantic import Field
@@ -18,7 +17,7 @@ from cembench.registry import algorithm
 from ..cetm.disk import cetm
 from ..cetm.flips import cetm_flips
 from ..direct_cem.disk import direct_cem
-from .choice import Candidate, best_of
+from .choice import USUAL_WORK, Candidate, best_of
 
 #: In the order of their cost.
 CANDIDATES = {
@@ -28,8 +27,8 @@ CANDIDATES = {
     "cetm-flips": Candidate(cetm_flips, cost=8),
 }
 
-#: The most steps from the best map, which the last of them do not improve any more.
-MOST_STEPS = 10
+#: The most steps from the best map, and what each costs as in :class:`Candidate`.
+MOST_STEPS, STEP = 10, 4.0
 
 
 @algorithm(
@@ -42,7 +41,7 @@ MOST_STEPS = 10
 def best(
     mesh: DiskMesh,
     *,
-    seconds: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 60.0,
+    work: Annotated[float, Field(gt=0, allow_inf_nan=False)] = USUAL_WORK,
     repair: bool = True,
 ) -> Parameterization:
     """Map to the disk by direct-cem, cetm and cetm-flips, and keep the smallest mean angle error.
@@ -50,19 +49,16 @@ def best(
     For somebody with one surface, who wants the best map and not a comparison: no single algorithm
     has the smallest angle errors everywhere. direct-cem always has a valid map, with its usual
     `back` and at the least E_C; cetm has slightly better angles where the mesh has a flat metric;
-    cetm-flips is better on surfaces that must be scaled very unevenly. An algorithm that would
-    probably end later than `seconds` after the start is left out. The best map is moved to the
-    Moebius gauge that is best for its angles; within this time, steps whose weights count all
-    triangles alike lower its mean angle error further, until one wins less than a thousandth
-    (`even_steps`). `chosen` names the algorithm, `tried` has the mean angle error of each, in
-    degrees, before all this.
+    cetm-flips is better on surfaces that must be scaled very unevenly. Of maps whose angle errors
+    are within 1 % of the smallest, the one with the most even texel density is taken. It is moved
+    to the Moebius gauge that is best for its angles, by the same rule; steps whose weights count
+    all triangles alike lower its mean angle error further, until one wins less than a thousandth
+    (`even_steps`). `work` limits the triangles mapped, in the time that direct-cem takes for one:
+    algorithms and steps that exceed it are left out, by the size of the surface alone, so that the
+    same surface always has the same map. `chosen` names the algorithm, `tried` has the mean angle
+    error, in degrees, and the texel density ratio of each, before all this.
     """
-    start = perf_counter()
-    chosen = best_of(mesh, CANDIDATES, seconds, repair=repair)
-    uv, steps = angle_gauge(mesh, chosen.uv), 0
-    while steps < MOST_STEPS and perf_counter() - start < seconds:
-        uv, taken = evened(mesh, uv, 1)
-        if not taken:
-            break
-        steps += 1
+    chosen = best_of(mesh, [CANDIDATES], work, repair=repair)
+    most = min(MOST_STEPS, int(work / (STEP * mesh.m)))
+    uv, steps = evened(mesh, angle_gauge(mesh, chosen.uv), most)
     return replace(chosen, uv=uv, extras=chosen.extras | {"even_steps": steps})

@@ -53,7 +53,7 @@ def direct_cem(
     gauge: Gauge = "boundary",
     back: Annotated[float, Field(ge=0, allow_inf_nan=False)] = 0.01,
     delaunay: bool = True,
-    even: Annotated[int, Field(ge=0, le=100)] = 0,
+    even: Annotated[int, Field(ge=0, le=100)] | None = None,
     repair: bool = True,
     last_resort: bool = True,
 ) -> Parameterization:
@@ -82,7 +82,8 @@ def direct_cem(
     the boundary is finally moved back towards it as far as that raises E_C by at most the share
     `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most `even`
     more steps, each as dear as all of this, lower the mean angle error with weights that count all
-    triangles alike, which pays on graded meshes (`even_steps`). Folds are repaired as in CEM
+    triangles alike (`even_steps`): by default two on graded meshes, which have many needles
+    and areas that vary over decades, and none on others. Folds are repaired as in CEM
     (`fold_repairs`); `last_resort` makes the map valid in any case.
     """
     del even  # the decorator's

@@ -16,7 +16,12 @@ from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair, figures
 from cembench.conformal.folds import interior_without_folds
-from cembench.conformal.metrics import angle_errors, flipped_triangles
+from cembench.conformal.metrics import (
+    CIRCULAR,
+    angle_errors,
+    boundary_circularity,
+    flipped_triangles,
+)
 from cembench.conformal.patches import filled
 from cembench.conformal.planar import crossing_polygons, fitted_circle, folded_triangles
 from cembench.core.clock import phase
@@ -63,8 +68,8 @@ def valid_with_holes(
     Returns
     -------
     z : complex (n,)
-        The map with the fewest folds, then without crossing boundaries, then with the least mean
-        angle error.
+        The map with the fewest folds, then without crossing boundaries, then with round holes,
+        then with the least mean angle error.
     extras : dict
         As for :func:`cembench.conformal.fold_repair.accepted_repair`. If the opened disk is the
         map, ``last_resort`` has ``opened_holes``, their number.
@@ -83,7 +88,7 @@ def valid_with_holes(
     extras["before_repair"] = figures(mesh, own, folded)
     with phase("folds"):
         cost = _cost(mesh, loops, repaired)
-    if cost < (0, False, POOR):
+    if cost < (0, False, False, POOR):
         return repaired, extras
     opened = opened_disk(mesh, loops[1:])
     with phase("folds"):
@@ -189,6 +194,8 @@ def _cross(z: Complex, loops: Sequence[Loop]) -> bool:
     return crossing_polygons([outer, *holes]) is not None
 
 
-def _cost(mesh: HoledMesh, loops: Sequence[Loop], z: Complex) -> tuple[int, bool, float]:
+def _cost(mesh: HoledMesh, loops: Sequence[Loop], z: Complex) -> tuple[int, bool, bool, float]:
     """Return the figures by which the better map is the smaller one."""
-    return flipped_triangles(mesh, z), _cross(z, loops), float(angle_errors(mesh, z).mean())
+    unround = boundary_circularity(mesh, z) > CIRCULAR
+    error = float(angle_errors(mesh, z).mean())
+    return flipped_triangles(mesh, z), _cross(z, loops), unround, error

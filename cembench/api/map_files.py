@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from cembench.api.settings import (
     AnyPath,
@@ -23,15 +23,37 @@ from cembench.core.reporter import SILENT, Reporter
 if TYPE_CHECKING:
     from cembench.api.map_surfaces import Maps
 
-#: The recommended algorithms, in order of preference; the first that takes the surface is used.
-DEFAULT_ALGORITHMS = ("direct-cem", "direct-cem-holes")
+#: What a map is for: the plane for textures, the disk for comparisons and registration.
+MapTarget = Literal["plane", "disk", "circular holes"]
+#: The recommended algorithms by target; the first that takes the surface is used.
+RECOMMENDED: Mapping[MapTarget, tuple[str, ...]] = {
+    "plane": ("plane", "plane-holes"),
+    "disk": ("direct-cem", "direct-cem-holes"),
+    "circular holes": ("direct-cem-holes",),
+}
 #: Names that stand for one algorithm on disks and another on surfaces with holes.
-_SEVERAL = {"best": ("best", "best-holes")}
+_SEVERAL = {"best": ("best", "best-holes"), "plane": RECOMMENDED["plane"]}
 
 
-def algorithms_named(name: str | None) -> tuple[str, ...]:
-    """Return the algorithms that a name stands for; the first that takes a surface maps it."""
-    return DEFAULT_ALGORITHMS if name is None else _SEVERAL.get(name, (name,))
+def algorithms_named(name: str | None, target: MapTarget | None) -> tuple[str, ...]:
+    """Return the algorithms that a name or a target stands for; the first that takes a surface
+    maps it.
+
+    Raises
+    ------
+    ParameterError
+        Both are given, or the target is unknown.
+
+    """
+    if target is not None and target not in RECOMMENDED:
+        allowed = ", ".join(map(repr, RECOMMENDED))
+        raise ParameterError(f"target={target!r} is unknown; allowed: {allowed}.")
+    if name is not None and target is not None:
+        raise ParameterError(
+            f"algorithm={name!r} and target={target!r} exclude each other: an algorithm has one "
+            "target. Give only one of them."
+        )
+    return RECOMMENDED[target or "plane"] if name is None else _SEVERAL.get(name, (name,))
 
 
 @checked
@@ -39,6 +61,7 @@ def map_files(
     meshes: AnyPath | Sequence[AnyPath],
     algorithm: str | None = None,
     *,
+    target: MapTarget | None = None,
     parameters: Mapping[str, Any] | None = None,
     output: AnyPath | None = None,
     uv: Placement = "unit",
@@ -78,8 +101,12 @@ def map_files(
     meshes : path or name, or sequence of them
         Mesh files (OBJ, OFF, PLY, STL, MAT), or names of surfaces; public ones are fetched.
     algorithm : str, optional
-        Name of an algorithm, see :func:`cembench.list_algorithms`; default: direct-cem, or
-        direct-cem-holes for surfaces with holes. best tries several and keeps the best map.
+        Name of an algorithm, see :func:`cembench.list_algorithms`, instead of a `target`. best
+        tries several and keeps the best map to the disk.
+    target : {"plane", "disk", "circular holes"}, optional
+        Take the recommended map to the plane, with a free boundary and the least angle errors, to
+        the disk, with round holes if there are any, or to the disk with round holes alone (default:
+        plane; disk with `certificate`, `geometry_image` or `remesh`, which need one).
     parameters : mapping, optional
         Parameters of the algorithm.
     output : path, optional
@@ -190,7 +217,9 @@ def map_files(
     options = Options(timeout=timeout, memory_bytes=bytes_of(memory_bytes))
     settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
     registry = registry_with(plugins, reporter)
-    candidates = [registry.algorithm(name) for name in algorithms_named(algorithm)]
+    if algorithm is None and target is None and (certificate or geometry_image or remesh):
+        target = "disk"
+    candidates = [registry.algorithm(name) for name in algorithms_named(algorithm, target)]
     apart = timeout != Options.timeout or memory_bytes is not None
     if overlay:
         check_overlay_options(
@@ -200,8 +229,8 @@ def map_files(
         check_takes_disks(candidates)
     if isinstance(meshes, str | PathLike):
         meshes = [meshes]
-    paths, target = [Path(mesh) for mesh in meshes], path_of(output)
-    outputs = output_files(paths, target)
+    paths, named_output = [Path(mesh) for mesh in meshes], path_of(output)
+    outputs = output_files(paths, named_output)
     named = {"geometry_image": geometry_image, "remeshed": remesh, "flat": flat, "html": html}
     extras = {what: Path(path) for what, path in named.items() if path is not None}
     file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
@@ -222,8 +251,8 @@ def map_files(
     refuse_twice(all_files, "files", "Name another path for one of them.")
     for path in all_files:
         refuse_inputs(path, inputs, force=overwrite)
-    refuse_present(others if target in outputs else [*written, *others], force=overwrite)
-    together = target if len(paths) > 1 and target in outputs else None
+    refuse_present(others if named_output in outputs else [*written, *others], force=overwrite)
+    together = named_output if len(paths) > 1 and named_output in outputs else None
     files = []
     for source, place in zip(sources, outputs, strict=True):
         with reporter.busy(f"reading {source}"):

@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING, Any, Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.api.map_files import algorithms_named
+from cembench.api.map_files import MapTarget, algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
-from cembench.api.settings import Placement
+from cembench.api.settings import Placement, Threads
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
@@ -26,6 +26,7 @@ from cembench.mesh.plausibility import implausible
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
+from cembench.running.in_this_process import numerical_threads
 from cembench.running.map_checks import figures
 from cembench.running.measure import check_cell, check_overlay, refinement_of
 from cembench.running.plan import MeasurementSettings, cell_of, distribute_parameters
@@ -208,7 +209,8 @@ class Result:
         Examples
         --------
         >>> import cembench
-        >>> result = cembench.parameterize(cembench.surface("hemi-ellipsoid", 2000))
+        >>> mesh = cembench.surface("hemi-ellipsoid", 2000)
+        >>> result = cembench.parameterize(mesh, target="disk")
         >>> proof = result.certificate()
         >>> proof.encloses(result.z[proof.corners])
         True
@@ -220,7 +222,7 @@ class Result:
         if certificate is None:
             raise ParameterError(
                 f"{self.algorithm.name} on {self.mesh.name} is no map to the disk, whose modulus "
-                "is known. Take an algorithm for disks, or for holes."
+                'is known. Take target="disk".'
             )
         return certificate
 
@@ -398,9 +400,11 @@ def parameterize(
     surface: SurfaceInput | ArrayLike,
     *faces_and_algorithm: ArrayLike | str,
     algorithm: str | None = None,
+    target: MapTarget | None = None,
     keep_invalid: bool = False,
     check: Check = "full",
     overlay: bool = False,
+    threads: Threads = 1,
     plugins: Iterable[str] = (),
     **parameters: Any,
 ) -> Result:
@@ -414,8 +418,11 @@ def parameterize(
     *faces_and_algorithm
         F, if `surface` is V; then the name of the algorithm, unless it is given by keyword.
     algorithm : str, optional
-        A name from :func:`cembench.list_algorithms`; default: ``"direct-cem"``, or
-        ``"direct-cem-holes"`` for surfaces with holes.
+        A name from :func:`cembench.list_algorithms`, instead of a `target`.
+    target : {"plane", "disk", "circular holes"}, optional
+        Take the recommended map to the plane, with a free boundary and the least angle errors
+        (``"plane"``, the default); to the disk, with round holes if there are any
+        (``"direct-cem"`` or ``"direct-cem-holes"``); or to the disk with round holes alone.
     keep_invalid : bool
         Whether to return an invalid map (for example, one with folds) instead of raising; see
         :attr:`Result.ok`.
@@ -426,6 +433,9 @@ def parameterize(
         Whether the map is on a refinement of the surface, without folds by construction; then
         :attr:`Result.mesh` is that. ``"cetm-flips"`` has it: the mesh cut along the edges of the
         flipped triangulation.
+    threads : int
+        Threads of the numerical libraries. As everywhere in this package, one by default, whatever
+        the environment says: the last digits of a map depend on their number.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters
@@ -443,8 +453,8 @@ def parameterize(
     RegistryError
         The algorithm is unknown.
     ParameterError
-        A parameter or a check is unknown, a value is out of range, two algorithms are named, or
-        there is no `overlay` of the algorithm.
+        A parameter, a check or a target is unknown, a value is out of range, two algorithms or an
+        algorithm and a target are named, or there is no `overlay` of the algorithm.
     AlgorithmFailed
         No map was found, or the map is not valid and `keep_invalid` is False.
 
@@ -470,19 +480,21 @@ def parameterize(
         raise ParameterError(f"two algorithms are named, {' and '.join(named)}; name one.")
     what: Any = (surface, *arrays) if arrays else surface
     registry = load_registry(plugins)
-    names = algorithms_named(named[0] if named else None)
+    names = algorithms_named(named[0] if named else None, target)
     candidates = [registry.algorithm(name) for name in names]
     mesh = load_surface(what, [a.mesh_type for a in candidates], registry=registry)
     full = check == "full"
     mesh = mesh.noted(implausible(mesh.V, mesh.F)) if full else mesh
     chosen = next(a for a in candidates if isinstance(mesh, a.mesh_type))
     arguments = distribute_parameters([chosen], parameters)[chosen.name]
-    cell = cell_of(chosen, mesh, arguments, MeasurementSettings(repeats=1), sources_of(chosen))
-    if overlay:
-        refinement_of(chosen)
-        outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)
-    else:
-        outcome, z = check_cell(chosen, mesh, cell, memory=False, figures=full)
+    settings = MeasurementSettings(repeats=1, threads=threads)
+    cell = cell_of(chosen, mesh, arguments, settings, sources_of(chosen))
+    with numerical_threads(threads):
+        if overlay:
+            refinement_of(chosen)
+            outcome, mesh, z = check_overlay(chosen, mesh, cell, figures=full)
+        else:
+            outcome, z = check_cell(chosen, mesh, cell, memory=False, figures=full)
     if z is None or (outcome.status != "ok" and not keep_invalid):
         raise AlgorithmFailed(f"{mesh.name} / {chosen.name}: {outcome.status}: {outcome.cause}")
     return Result(mesh, chosen, z, outcome)

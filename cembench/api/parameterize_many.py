@@ -9,6 +9,7 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any, Literal
 
+from cembench.api.map_files import MapTarget
 from cembench.api.parameterize import Check, Result, parameterize
 from cembench.core.errors import CembenchError, ParameterError
 from cembench.registry import load_registry
@@ -25,6 +26,7 @@ def parameterize_many(
     surfaces: Iterable[SurfaceInput],
     algorithm: str | None = None,
     *,
+    target: MapTarget | None = None,
     jobs: int = 1,
     check: Check = "fast",
     errors: Errors = "raise",
@@ -41,6 +43,8 @@ def parameterize_many(
     surfaces : iterable of meshes, paths, names or pairs (V, F); or one path or name
         Disks or surfaces with holes.
     algorithm : str, optional
+        As for :func:`parameterize`.
+    target : str, optional
         As for :func:`parameterize`.
     jobs : int
         Number of processes. A script that is run as the main program needs
@@ -82,7 +86,7 @@ def parameterize_many(
     if errors not in ("raise", "yield"):
         raise ParameterError(f"errors={errors!r} is unknown; allowed: 'raise', 'yield'.")
     one = partial(
-        _mapped, algorithm=algorithm, check=check, keep_invalid=keep_invalid,
+        _mapped, algorithm=algorithm, target=target, check=check, keep_invalid=keep_invalid,
         plugins=tuple(plugins), **parameters,
     )  # fmt: skip
     if isinstance(surfaces, str | os.PathLike):

@@ -348,26 +348,35 @@ class EnergyModel:
 
     @cached_property
     def held(self) -> NDArray[np.int64]:
-        """Whether each arc has its minimal length and would become shorter downhill."""
-        domain = self.domain
-        short = np.flatnonzero(domain.shortest)
-        if not len(short):
-            return short
-        rims, B = domain.rims, len(domain.arcs)
-        downhill = -_projected(self._free_uphill, self._gauge)[:B]
-        change = rims.sense * (downhill[rims.following] - downhill)
-        return short[change[short] < 0]
+        """The arcs that have their minimal length and would become shorter downhill."""
+        rims, B = self.domain.rims, len(self.domain.arcs)
+        short = self.domain.shortest(MOST_HELD)
+        held, constraints = short[:0], self._gauge
+        while len(short):
+            downhill = -_projected(self._free_uphill, constraints)[:B]
+            change = rims.sense * (downhill[rims.following] - downhill)
+            more = np.setdiff1d(short[change[short] < 0], held)
+            if not len(more):
+                break
+            held = np.union1d(held, more)  # others may become shorter once these are held
+            if len(held) > MOST_HELD:
+                break
+            constraints = self._keeping(held)
+        return held
+
+    def _keeping(self, held: NDArray[np.int64]) -> tuple[Real, Real, Real]:
+        """The constraints of the gauge, and those that keep the length of some arcs."""
+        if not len(held):
+            return self._gauge
+        c, k = self._gauge[0], np.arange(len(held))
+        keep = np.zeros((len(c), len(k)))
+        keep[self.domain.rims.following[held], k] = 1
+        keep[held, k] = -1
+        return self._constrained(np.concatenate([c, keep], axis=1))
 
     @cached_property
     def _constraints(self) -> tuple[Real, Real, Real]:
-        """The constraints of the gauge, and those that keep the length of held arcs."""
-        if not len(self.held):
-            return self._gauge
-        c, k = self._gauge[0], np.arange(len(self.held))
-        keep = np.zeros((len(c), len(k)))
-        keep[self.domain.rims.following[self.held], k] = 1
-        keep[self.held, k] = -1
-        return self._constrained(np.concatenate([c, keep], axis=1))
+        return self._keeping(self.held)
 
     def precondition(self, g: Real) -> Real:
         """Return M^-1 g projected onto the steps that keep the gauge."""

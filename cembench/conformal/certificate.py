@@ -84,8 +84,13 @@ class Certificate:
         own = self.of_map(z)
         if not np.isfinite(own):
             return f"the surface's modulus is {bounds}; the map's corners are not in order"
-        place = "within" if self.encloses(z) else f"{abs(self.off(z)):.2%} off, outside"
-        return f"the surface's modulus is {bounds}; the map's is {own:.5g}, {place}"
+        if self.encloses(z):
+            return f"the surface's modulus is {bounds}; the map's is {own:.5g}, within"
+        outside = max(own / self.upper, self.lower / own) - 1
+        return (
+            f"the surface's modulus is {bounds}; the map's is {own:.5g}, {outside:.2%} outside. "
+            f"{_beside(outside, self.reciprocal_error)}"
+        )
 
     def encloses(self, z: Complex) -> bool:
         """Whether the modulus of the corners' images z (4,) lies between the two bounds."""
@@ -180,10 +185,17 @@ class HolesCertificate:
                 f"{about} at most {most:.2%}, within the bounds: these circles may be the "
                 "surface's; angle errors tell of the map between them"
             )
-        return (
-            f"{about} {least:.2%} to {most:.2%}, outside the bounds: no map of this mesh to these "
-            "circles is conformal"
-        )
+        return f"{about} at least {least:.2%}. {_beside(least, self.reciprocal_error)}"
+
+
+def _beside(outside: float, own: float) -> str:
+    """Return how far outside the bounds a map is, compared with the distance of the bounds."""
+    compared = (
+        f"{outside / own:.1f} times that"
+        if outside > own
+        else "less than that, as of many maps close to conformal"
+    )
+    return f"The bounds, and so the triangles' own error, are {own:.2%} apart; this is {compared}"
 
 
 #: How far the image of a hole may be off a circle, as a share of the radius.

@@ -139,10 +139,12 @@ class CircleDomain:
         share = (self.arcs + self.arcs[self.rims.previous]) / (4 * np.pi)
         return np.where(self.rims.on_outer, share, 0.0)
 
-    @property
-    def shortest(self) -> NDArray[np.bool_]:
-        """Whether each arc has its minimal length and is long enough to matter; (B,)."""
-        return (self.arcs <= 1.01 * self.least) & (self.arcs > self._resolved)
+    def shortest(self, most: int) -> Indices:
+        """Return the arcs of minimal length; if they are more than `most`, those that matter."""
+        shortest = np.flatnonzero(self.arcs <= 1.01 * self.least)
+        if len(shortest) > most:
+            return shortest[(self.arcs > self._resolved)[shortest]]
+        return shortest
 
     @property
     def _resolved(self) -> Real:

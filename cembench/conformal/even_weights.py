@@ -19,6 +19,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cembench.conformal.laplacian import corner_products
 from cembench.conformal.metrics import angle_errors, flipped_triangles
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
@@ -37,6 +38,11 @@ FLOOR = 0.1
 DAMPING = 1e-6
 #: A step is halved so often at most.
 HALVINGS = 6
+#: A mesh is graded if this share of its triangles has an angle below so many degrees, and the
+#: natural logarithms of the areas have this standard deviation; then this many steps are taken.
+NEEDLES, THIN, SPREAD, USUAL_STEPS = 0.04, 5.0, 1.2, 2
+#: Every k-th triangle is looked at, these or a few more in all.
+SAMPLE = 4_000
 
 
 def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
@@ -104,17 +110,40 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
 
 
 def with_even_steps(method: Callable[..., Parameterization]) -> Callable[..., Parameterization]:
-    """Let an algorithm for disks end in at most `even` steps of :func:`evened`, a parameter."""
+    """Let an algorithm for disks end in at most `even` steps of :func:`evened`, a parameter.
+
+    None takes :data:`USUAL_STEPS` if :func:`is_graded` holds, and no step on other meshes.
+    """
 
     @functools.wraps(method)
     def evenly(mesh: DiskMesh, **parameters: Any) -> Parameterization:
         own = method(mesh, **parameters)
-        if not parameters.get("even"):
+        steps = parameters.get("even")
+        if steps is None:
+            steps = USUAL_STEPS if is_graded(mesh) else 0
+        if not steps:
             return own
-        uv, taken = evened(mesh, own.uv, parameters["even"])
+        uv, taken = evened(mesh, own.uv, steps)
         return replace(own, uv=uv, extras=own.extras | {"even_steps": taken})
 
     return evenly
+
+
+def is_graded(mesh: DiskMesh) -> bool:
+    """Whether the areas of a mesh vary so much, and needles are so many, that E_C misses triangles.
+
+    Its least E_C may then have far larger angle errors than needed.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> is_graded(cembench.surface("hemi-ellipsoid", 600))
+    False
+
+    """
+    dots, double_area = corner_products(mesh.V, mesh.F[:: max(1, mesh.m // SAMPLE)])
+    needles = dots.max(axis=1) * np.tan(np.deg2rad(THIN)) > double_area
+    return bool(needles.mean() > NEEDLES and np.log(double_area).std() > SPREAD)
 
 
 def _gradients(mesh: DiskMesh) -> Complex:

@@ -96,9 +96,9 @@ def unrolled(mesh: DiskMesh) -> Parameterization:
 
 
 def with_area_pi(
-    mesh: DiskMesh, uv: Complex, *, repair: bool = True
+    mesh: DiskMesh | HoledMesh, uv: Complex, *, repair: bool = True
 ) -> tuple[Complex, dict[str, Any]]:
-    """Scale a map so that its boundary encloses pi, as a disk does, and `repair` interior folds.
+    """Scale a map so that its boundaries enclose pi, as a disk does, and `repair` interior folds.
 
     Returns
     -------
@@ -110,10 +110,10 @@ def with_area_pi(
     Raises
     ------
     AlgorithmFailed
-        The boundary encloses no positive area.
+        The boundaries enclose no positive area.
 
     """
-    area = polygon_area(uv[mesh.boundary])
+    area = sum(polygon_area(uv[loop]) for loop in mesh.loops)
     if not area > 0:
         raise AlgorithmFailed(
             f"the image of the boundary encloses an area of {area:.3g}, which is not positive: "

@@ -3,10 +3,11 @@
 A triangle whose three corners lie on arcs of length h has an area of about h^3 / 4, and its sign is
 lost in rounding below :data:`LEAST_ARC`; so arcs at folds are widened to that. The interior around
 the folds is laid out again in patches (:mod:`cembench.conformal.folds`). Where that is not enough,
-or costs angles, every interior vertex becomes a mean of its neighbours with positive weights: mean
-value weights of the image, which reproduce it, except near folds, where they are the surface's. On
-a convex boundary such a map has no folds (Tutte 1963; Floater 2003). At worst the surface's weights
-are used everywhere.
+or costs angles, the surface's mean value weights place the vertices of small patches around the
+folds, a few times over. Where that costs angles too, every interior vertex becomes a mean of its
+neighbours with positive weights: mean value weights of the image, which reproduce it, except near
+folds, where they are the surface's. On a convex boundary such a map has no folds (Tutte 1963;
+Floater 2003). At worst the surface's weights are used everywhere.
 """
 
 from __future__ import annotations
@@ -47,6 +48,11 @@ RINGS = (0, 2, 8)
 #: Patches are no remedy if more than this share of the triangles fold; they are all that is tried
 #: if they raise the mean angle error by no more than the share CHEAP.
 MOST_FOLDED, CHEAP = 0.3, 0.01
+#: Rings of vertices around folds that mean value weights place in patches, and how many times.
+MEANS_RINGS, MEANS_ROUNDS = (1, 2, 4), 5
+#: A valid map is good enough if its mean angle error is at most so many degrees above that of the
+#: algorithm's own map, and not above so many.
+ENOUGH, GOOD = 1.0, 10.0
 #: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
 MOST_TRIANGLES = 20_000
 #: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
@@ -127,10 +133,13 @@ def valid_map(
         if own is not None and folded:
             extras["before_repair"] = before = figures(mesh, own, folded)
             cheap = (1 + CHEAP) * before["angle_error_mean_deg"]
+            enough = max(cheap, min(before["angle_error_mean_deg"] + ENOUGH, GOOD))
             extras["fold_repairs"] = _offer_patches(choice, own, folded)
             if not choice.reaches(cheap):
+                _offer_means_in_patches(choice, own, folded)
+            if not choice.reaches(enough):
                 extras["fold_repairs"] += _offer_harmonic_map(choice, own, folded)
-            if not choice.reaches(cheap):
+            if not choice.reaches(enough):
                 _offer_convex_maps(choice, own)
         if own is None or crowded or (folded and not choice.reaches(BAD)):
             _offer_mean_value_maps(choice, own)
@@ -210,6 +219,35 @@ def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
     z, rounds = interior_without_folds(mesh, z)
     choice.offer(z)
     return rounds
+
+
+def _offer_means_in_patches(choice: _Choice, own: Complex, folded: int) -> None:
+    """Offer maps with the surface's mean value weights around folds, all else as it is.
+
+    What folds at the edge of a patch makes it larger in the next round.
+    """
+    mesh = choice.mesh
+    if folded > MOST_FOLDED * mesh.m:
+        return
+    graph, W = vertex_graph(mesh.F, mesh.n), mean_value_weights(mesh.V, mesh.F)
+    inside = ~_rings(graph, mesh.boundary, 0)
+    for rings in MEANS_RINGS:
+        near = _rings(graph, mesh.F[folded_triangles(own, mesh.F)], rings)
+        z = _widened(mesh, own, np.flatnonzero(near))
+        if z is None or not (near & inside).any():
+            return
+        for _ in range(MEANS_ROUNDS):
+            free = near & inside
+            choice.solves += 1
+            try:
+                z = convex_extension(W, np.flatnonzero(~free), np.flatnonzero(free), z)
+            except AlgorithmFailed:
+                break
+            left = folded_triangles(z, mesh.F)
+            if not len(left):
+                choice.offer(z, int(free.sum()))
+                break
+            near |= _rings(graph, mesh.F[left], rings)
 
 
 def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:

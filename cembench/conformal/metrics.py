@@ -170,6 +170,10 @@ class BoundaryCircle:
     circularity: float
 
 
+#: Distance from a circle, relative to its radius, up to which a hole's image counts as one.
+CIRCULAR = 1e-3
+
+
 def boundary_circles(mesh: TriangleMesh, uv: Complex) -> tuple[BoundaryCircle, ...]:
     """Return the circles fitted to the boundary images, that of the largest area first."""
     loops = sorted(mesh.loops, key=lambda loop: polygon_area(uv[loop]), reverse=True)

@@ -233,7 +233,6 @@ def _check_disk(mesh: TriangleMesh, z: Complex) -> None:
     else:
         why = f"the surface has {len(mesh.loops)} boundaries"
     raise ParameterError(
-        f"the map of {mesh.name} does not cover the disk: {why}. Use an algorithm whose target "
-        "is the "
-        "disk, such as direct-cem on a surface with one boundary."
+        f'the map of {mesh.name} does not cover the disk: {why}. Take target="disk" on a '
+        "surface with one boundary."
     )

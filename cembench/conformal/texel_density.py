@@ -98,7 +98,11 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
     if "texel_density_ratio" not in metrics:
         return ""
     ratio, share = metrics["texel_density_ratio"], metrics["undersampled_share"] or 0.0
-    words = "texel density has no bound" if ratio is None else f"texel density varies {_of(ratio)}"
+    words = (
+        "texel density has no bound"
+        if ratio is None
+        else f"texel density varies {density_words(ratio)}"
+    )
     if not share:
         return words
     part = f"{100 * share:.0f} %" if share >= 0.01 else "under 1 %"
@@ -110,10 +114,10 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
 _NAMED = ((1e12, "trillion"), (1e9, "billion"), (1e6, "million"))
 
 
-def _of(ratio: float) -> str:
-    """Return a ratio to 1 as people write it.
+def density_words(ratio: float) -> str:
+    """Return a ratio of densities as people write it.
 
-    >>> _of(2.26), _of(1538.2), _of(6.8e7)
+    >>> density_words(2.26), density_words(1538.2), density_words(6.8e7)
     ('2.3 : 1', '1,538 : 1', '68 million : 1')
     """
     for size, name in _NAMED:

@@ -43,6 +43,7 @@ class NoticeKind(StrEnum):
 
     # About a map or its measurement.
     IMAGE_OVERLAPS = "image_overlaps"
+    #: Only in records made before this was a fault.
     HOLES_NOT_CIRCULAR = "holes_not_circular"
     #: A metric is not finite, or is dominated by rounding.
     LOST_IN_ROUNDING = "lost_in_rounding"

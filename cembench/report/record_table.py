@@ -5,7 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from cembench.conformal.texel_density import ISLANDS, needs_islands, texture_words
+from cembench.conformal.texel_density import (
+    ISLANDS,
+    density_words,
+    needs_islands,
+    texture_words,
+)
 from cembench.report.declarations import own
 from cembench.report.document import Column, Table
 from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
@@ -57,7 +62,7 @@ def _known(record: Record) -> dict[str, Any]:
     outcome, known = record.outcome, {name: one.of(record) for name, one in COLUMNS.items()}
     seconds, spoken = outcome.median_seconds, seconds_words(record)
     chosen, tried = (outcome.extras.get(key) for key in ("chosen", "tried"))
-    errors = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
+    compared = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
     return known | {
         "in_the_paper": _printed(record) if record.mesh.paper_row else "",
         "took": "" if seconds is None else spoken or f"{significant(seconds)} s",
@@ -65,9 +70,16 @@ def _known(record: Record) -> dict[str, Any]:
         "by_phase": ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items()),
         "given": [f"{name}={value}" for name, value in record.cell.parameters.items()],
         "chosen": chosen,
-        "tried": [f"{n} {e:.2f}" if type(e) is float else f"{n} none" for n, e in errors.items()],
+        "tried": [f"{name} {_compared(one)}" for name, one in compared.items()],
         "texture": texture_words(outcome.metrics),
     }
+
+
+def _compared(one: Any) -> str:
+    """Return the figures of a map that was compared, or "none"; records before them have errors."""
+    if not isinstance(one, Mapping):
+        return f"{one:.2f}" if isinstance(one, float) else "none"
+    return f"{one['angle_error_mean_deg']:.2f} ({density_words(one['texel_density_ratio'])})"
 
 
 def _metrics(record: Record) -> Iterator[tuple[str, str]]:

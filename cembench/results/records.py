@@ -33,7 +33,12 @@ SCHEMA_VERSION = 1
 #: The algorithm that others are compared with where neither a paper nor an option names one.
 REFERENCE = "cem"
 #: The algorithm that others of a target are compared with, unless a run says otherwise.
-USUAL_REFERENCES = {"disk": REFERENCE, "free boundary": "lscm", "circular holes": "koebe-cem"}
+USUAL_REFERENCES = {
+    "disk": REFERENCE,
+    "free boundary": "lscm",
+    "circular holes": "koebe-cem",
+    "disk with holes": "harmonic-filled",
+}
 
 #: With this many cores busy with other work, a process counts as measured on a busy machine.
 BUSY_CORES = 0.25
@@ -149,6 +154,8 @@ class FaultKind(StrEnum):
     BOUNDARY_ORDER = "boundary_order"
     BOUNDARIES_CROSS = "boundaries_cross"
     HOLE_ORIENTATION = "hole_orientation"
+    #: A hole is no circle, or its circle meets another one or leaves the disk.
+    HOLES_NOT_CIRCULAR = "holes_not_circular"
     REVERSED = "reversed"
     FOLDED = "folded"
     #: No metrics can be computed from the map.

@@ -7,7 +7,8 @@ own are for what is compared, for plug-ins and programs, and where a limit has t
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,15 @@ def may_run_here(task: Task) -> bool:
     return ROUGH_BYTES_A_FACE * mesh.m < _SHARE * free and task.cell.threads == 1
 
 
+@contextmanager
+def numerical_threads(count: int) -> Iterator[None]:
+    """Let the numerical libraries use so many threads: sums, and so maps, depend on the number."""
+    for name in _CALLED:  # one that is loaded later has its own number
+        importlib.import_module(name)
+    with threadpool_limits(limits=count):
+        yield
+
+
 def map_here(task: Task) -> tuple[Record, NDArray[np.complex128] | None]:
     """Call once in this process, and keep nothing on disk; see :func:`local.map_once`."""
     return _recorded(task, check_cell)
@@ -53,8 +63,6 @@ def overlay_here(task: Task) -> tuple[Record, TriangleMesh, NDArray[np.complex12
 def _recorded(task: Task, check: Callable[..., tuple[Any, ...]]) -> tuple[Any, ...]:
     """Return the record of a checked call, with what else the check returns."""
     started = now()
-    for name in _CALLED:  # else the call would load them
-        importlib.import_module(name)
-    with threadpool_limits(limits=1):
+    with numerical_threads(1):
         outcome, *returned = check(task.algorithm, task.mesh, task.cell)
     return record_of(task, outcome, describe_environment()["id"], started), *returned

@@ -21,7 +21,12 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from cembench.conformal.atlas import AtlasFigures, cut_map
-from cembench.conformal.metrics import boundary_circles, flipped_triangles, image_area
+from cembench.conformal.metrics import (
+    CIRCULAR,
+    boundary_circles,
+    flipped_triangles,
+    image_area,
+)
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns, winding_words
 from cembench.core.arrays import Complex
 from cembench.core.notices import Notice, NoticeKind
@@ -31,8 +36,8 @@ from cembench.results.records import Fault, FaultKind
 
 #: Tolerance of a disk's boundary vertices from the unit circle.
 CIRCLE_TOLERANCE = 1e-9
-#: Tolerance for a hole's image to count as a circle, relative to its radius.
-CIRCULAR = 1e-3
+#: Targets with the outer boundary on the unit circle, and holes inside it.
+WITH_HOLES = "circular holes", "disk with holes"
 
 
 class Promise(BaseModel):
@@ -73,11 +78,12 @@ def faults(promised: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> li
     is_reversed = image_area(mesh, uv) <= 0 or flipped == mesh.m
     placed: list[Fault] = []
     order: list[Fault] = []
-    if promise.target in ("disk", "circular holes"):
+    if promise.target in ("disk", *WITH_HOLES):
         placed, order = _of_the_circle(mesh, uv, promise.circle)
-    if promise.target == "circular holes":
+    if promise.target in WITH_HOLES:
         placed += _crossings(mesh, uv)
         placed += _turned_holes(mesh, uv) if not (placed or is_reversed) else []
+        order += _uncircular_holes(mesh, uv, promise)
     elif promise.target == "disk" and not (flipped or placed or order):
         order = _crossings(mesh, uv)
     if is_reversed:
@@ -125,18 +131,16 @@ def broken_premises(mesh: TriangleMesh) -> list[str]:
 
 
 def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> list[Notice]:
-    """Return remarks on a map without faults.
+    """Return the remark on a map without faults whose free boundary overlaps itself.
 
-    These are that a free boundary overlaps itself, which its target allows, and that holes are not
-    circles: their circularity is a metric like the energy, not a promise.
+    Its target allows that.
     """
-    if algorithm.target == "free boundary":
-        crossings = _crossings(mesh, uv)
-        return [
-            Notice(NoticeKind.IMAGE_OVERLAPS, f"the image overlaps itself: {fault.detail}")
-            for fault in crossings
-        ]
-    return _uncircular_holes(mesh, uv) if algorithm.target == "circular holes" else []
+    if algorithm.target != "free boundary":
+        return []
+    return [
+        Notice(NoticeKind.IMAGE_OVERLAPS, f"the image overlaps itself: {fault.detail}")
+        for fault in _crossings(mesh, uv)
+    ]
 
 
 def _fault(kind: FaultKind, detail: str) -> Fault:
@@ -193,23 +197,27 @@ def _turned_holes(mesh: TriangleMesh, uv: Complex) -> list[Fault]:
     ]
 
 
-def _uncircular_holes(mesh: TriangleMesh, uv: Complex) -> list[Notice]:
-    circles = boundary_circles(mesh, uv)[1:]
+def _uncircular_holes(mesh: TriangleMesh, uv: Complex, promise: Promise) -> list[Fault]:
+    """Return the fault that holes are not circles inside the disk that are apart."""
+    if promise.target != "circular holes":
+        return []
+    circles, allowed = boundary_circles(mesh, uv)[1:], max(CIRCULAR, promise.circle)
     texts = []
-    off = [circle.circularity for circle in circles if not circle.circularity <= CIRCULAR]
+    off = [circle for circle in circles if not circle.circularity <= allowed]
     if off:
+        worst = max(off, key=lambda circle: circle.circularity)
         texts.append(
-            f"{len(off)} of {len(circles)} holes are not circles: off by up to {max(off):.2g} of "
-            "the radius"
+            f"{len(off)} of {len(circles)} holes are not circles: that of vertex {worst.vertex} is "
+            f"off by {worst.circularity:.2g} of its radius, {allowed:g} is allowed"
         )
     # Three vertices are always on a circle, but not always on one inside the disk.
-    out = [c for c in circles if c.circularity <= CIRCULAR < abs(c.centre) + c.radius - 1]
+    out = [c for c in circles if c.circularity <= allowed < abs(c.centre) + c.radius - 1]
     if out:
         texts.append(f"the circles of {len(out)} of {len(circles)} holes reach outside the disk")
     if any(
-        abs(one.centre - other.centre) < (one.radius + other.radius) * (1 - CIRCULAR)
+        abs(one.centre - other.centre) < (one.radius + other.radius) * (1 - allowed)
         for one, other in combinations(circles, 2)
-        if max(one.circularity, other.circularity) <= CIRCULAR
+        if max(one.circularity, other.circularity) <= allowed
     ):
         texts.append("circles of holes overlap")
-    return [Notice(NoticeKind.HOLES_NOT_CIRCULAR, text) for text in texts]
+    return [_fault(FaultKind.HOLES_NOT_CIRCULAR, "; ".join(texts))] if texts else []

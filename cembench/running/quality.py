@@ -15,15 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.bordered import BorderedLaplacian
 from cembench.conformal.boundary_energy import EnergyModel, in_gauge
 from cembench.conformal.circle_domain import CircleDomain
+from cembench.conformal.even_weights import evened
 from cembench.conformal.filled_start import arcs_of_measure, widest_start
 from cembench.conformal.free_boundary import pinned_map, two_distant_vertices
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import by_rows, laplacian, laplacian_of_weights
-from cembench.conformal.metrics import MapFigures, angle_errors, flipped_triangles
+from cembench.conformal.metrics import (
+    MapFigures,
+    angle_errors,
+    corner_angles,
+    flipped_triangles,
+)
 from cembench.conformal.planar import polygon_area, signed_areas
 from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
@@ -45,6 +52,10 @@ COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
+#: A step of best is tried on surfaces of at most so many triangles.
+QUICK = 50_000
+#: Needles are named as a cause above this share of triangles with an angle below so many degrees.
+NEEDLES, THIN = 0.04, 5.0
 #: Other parameters are better if the mean angle error with them is below this share.
 BETTER = 0.9
 
@@ -63,32 +74,51 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         return notes
     known = yardstick(target, figures)
     reachable = np.inf if known is None else float(figures.angle_errors_of(known).mean())
-    free, advice = free_map(mesh) if error > COMPARED else (np.inf, "")
+    free, tried = free_map(mesh) if error > COMPARED else (np.inf, "")
     most = FAR * reachable, FAR_FROM_FREE * free, COLLAPSED * collapsed_error(figures), POOR
     if error <= min(most):
         return notes
-    causes = "; ".join(likely_causes(mesh, uv, extras))
-    harmonic = "a harmonic map of this mesh by harmonic measure"
+    causes, advice = "; ".join(likely_causes(mesh, uv, extras)), ""
     if error > FAR * reachable:
-        compared = f"but {harmonic} reaches {reachable:.2f}"
+        compared = f"but with its boundary by harmonic measure it is {reachable:.2f}"
         causes = causes or "the method, not the mesh"
     elif error > FAR_FROM_FREE * free:
-        compared = f"but a free boundary reaches {free:.2g} with {advice}"
+        compared = f"but with a free boundary, as of {tried}, it is {free:.2g}"
         causes = causes or "the surface is too long, or its mesh too coarse, for this domain"
+        advice = "--target plane, if the boundary may be free"
     else:
-        others = {harmonic: reachable, "a free boundary": free}
-        known_others = [f"{name} ({one:.2f})" for name, one in others.items() if one < np.inf]
-        compared = f"and hardly better in {' or '.join(known_others) or 'any map known here'}"
+        others = {"its boundary by harmonic measure": reachable, "a free boundary (lscm)": free}
+        named = [f"with {name} {one:.2f}" for name, one in others.items() if one < np.inf]
+        compared = "; ".join(named) or "and no other map was computed"
         causes = causes or "the mesh is too coarse"
     text = (
         f"far from conformal: the mean angle error is {error:.2f} degrees, {compared}. Likely "
-        f"cause: {causes}"
+        f"cause: {causes}. Take {advice or _better(target, figures)}"
     )
     return [*notes, Notice(NoticeKind.FAR_FROM_CONFORMAL, text)]
 
 
+def _better(target: str, figures: MapFigures) -> str:
+    """Return which algorithm to try, and what a step of it makes of a small disk's map."""
+    mesh = figures.mesh
+    if target != "disk" or not isinstance(mesh, DiskMesh):
+        return "-a best-holes, or --target plane"
+    advice = "-a best, which tries several algorithms"
+    if mesh.m > QUICK:
+        return advice
+    uv, steps = evened(mesh, angle_gauge(mesh, figures.uv), 1)
+    better = float(figures.angle_errors_of(uv).mean())
+    return f"{advice}: its first step brings this map to {better:.2f}" if steps else advice
+
+
 def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) -> list[Notice]:
     """Return a remark on what a method's last resort did, and what that cost."""
+    if wanted := extras.get("instead_of"):
+        tried = {name: why for name, why in extras["tried"].items() if name != extras["chosen"]}
+        causes = "; ".join(f"{name}: {_why_not(why)}" for name, why in tried.items())
+        chosen = extras["chosen"]
+        message = f"{wanted} is not valid here, or worse ({causes}), so this is that of {chosen}"
+        return [Notice(NoticeKind.LAST_RESORT, message)]
     done = extras.get("last_resort")
     if not done:
         return []
@@ -111,13 +141,18 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
         f"degrees{cost}"
     )
     if done["mean_value_vertices"] == len(mesh.interior):
-        free, advice = free_map(mesh)
+        free, by = free_map(mesh)
         if free < error:
             message += (
-                f". The surface may be too long for one disk: a free boundary reaches {free:.2g} "
-                f"with {advice}"
+                ". The surface may be too long for one disk: a free boundary has room for it, as "
+                f"of --target plane; {by} reaches {free:.2g}"
             )
     return [Notice(NoticeKind.LAST_RESORT, message)]
+
+
+def _why_not(tried: Any) -> str:
+    """Return what an algorithm that chooses says of a map that it did not choose."""
+    return tried if isinstance(tried, str) else f"{tried['angle_error_mean_deg']:.2f} degrees"
 
 
 def better_parameters(
@@ -150,7 +185,10 @@ def collapsed_error(figures: MapFigures) -> float:
 def likely_causes(mesh: TriangleMesh, uv: Complex, extras: Mapping[str, Any]) -> list[str]:
     """Return properties of the mesh or the method that can explain large angle errors."""
     causes = []
-    if definition_1_notices(mesh.F, mesh.n, mesh.loops):
+    needles = float((corner_angles(mesh.V, mesh.F).min(axis=1) < THIN).mean())
+    if needles > NEEDLES:
+        causes.append(f"needles ({needles:.0%} of the triangles have an angle below {THIN:g})")
+    elif definition_1_notices(mesh.F, mesh.n, mesh.loops):
         causes.append("ears or pinches of the mesh (it breaks Definition 1)")
     repairs = extras.get("fold_repairs")
     if repairs:

@@ -10,6 +10,7 @@ import numpy as np
 
 from cembench.conformal.certificate import certify
 from cembench.conformal.metrics import (
+    CIRCULAR,
     all_metrics,
     boundary_circularity,
     flipped_triangles,
@@ -18,7 +19,7 @@ from cembench.conformal.metrics import (
 from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
-from cembench.running.map_promises import CIRCLE_TOLERANCE, CIRCULAR
+from cembench.running.map_promises import CIRCLE_TOLERANCE
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
 from cembench.validation.finding import ValidationFinding, finding
@@ -110,17 +111,17 @@ def boundary_findings(
     """Yield checks that the boundary lies where the target says; none for a free boundary."""
     if algorithm.target == "free boundary":
         return
-    disk = algorithm.target == "disk"
-    off = [_off_circle(m) if disk else _off_circles(m) for m in maps]
+    round_holes = algorithm.target == "circular holes"
+    off = [_off_circles(m) if round_holes else _off_circle(m) for m in maps]
     worst = int(np.argmax(off))
-    allowed = CIRCLE_TOLERANCE if disk else CIRCULAR
+    allowed = CIRCULAR if round_holes else CIRCLE_TOLERANCE
     ok = off[worst] <= allowed
     where = "" if ok else f", on {_named(maps[worst])}"
     yield _finding(
         "boundary",
         f"up to {off[worst]:.1e} off the circle{where}",
         ok=ok,
-        holes="" if disk else ", holes on circles",
+        holes=", holes on circles" if round_holes else "",
         within=allowed,
     )
 
@@ -292,14 +293,13 @@ def _figure(mapped: CheckedMap, name: str) -> float:
 
 
 def _off_circle(mapped: CheckedMap) -> float:
-    return float(np.abs(np.abs(_uv(mapped)[mapped.mesh.loops[0]]) - 1).max())
+    uv = _uv(mapped)
+    outer = max(mapped.mesh.loops, key=lambda loop: float(np.abs(uv[loop]).max()))
+    return float(np.abs(np.abs(uv[outer]) - 1).max())
 
 
 def _off_circles(mapped: CheckedMap) -> float:
-    uv = _uv(mapped)
-    outer = max(mapped.mesh.loops, key=lambda loop: float(np.abs(uv[loop]).max()))
-    off = float(np.abs(np.abs(uv[outer]) - 1).max())
-    return max(off, boundary_circularity(mapped.mesh, uv))
+    return max(_off_circle(mapped), boundary_circularity(mapped.mesh, _uv(mapped)))
 
 
 def _uv(mapped: CheckedMap) -> Complex:

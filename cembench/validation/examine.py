@@ -48,7 +48,7 @@ from cembench.validation.solver import Call, Solver
 from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
-_GROWTH_REFERENCE = {"disk": "cem", "free boundary": "lscm", "circular holes": "direct-cem-holes"}
+_GROWTH_REFERENCE = USUAL_REFERENCES | {"circular holes": "direct-cem-holes"}
 
 
 @dataclass(frozen=True)

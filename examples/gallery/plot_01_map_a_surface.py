@@ -2,15 +2,16 @@
 Map a surface
 =============
 
-Map a surface to the unit disk, look at it under a checkerboard, and read the figures.
+Map a surface to the plane, look at it under a checkerboard, and read the figures.
 """
 
 import cembench
 
 # %%
 # A surface is a file, a pair of arrays, or the name of a surface that can be made. This one is a
-# generated face, a stand-in for a scan. The default algorithm suits the kind of surface; here it is
-# named, so that the face goes to the disk.
+# generated face, a stand-in for a scan. The algorithm need not be named: the default is the map
+# with the smallest angle errors that neither folds nor overlaps. Here it is named, so that the face
+# goes to the disk.
 
 surface = cembench.surface("liu-smile-face-stand-in", 6_000)
 result = cembench.parameterize(surface, "direct-cem")

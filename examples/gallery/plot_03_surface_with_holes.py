@@ -2,8 +2,8 @@
 A surface with holes
 ====================
 
-A surface with several boundary loops goes to a disk with round holes. The outer loop is the
-widest one unless you name a vertex of another.
+With ``target="circular holes"`` a surface with several boundary loops goes to a disk with round
+holes. The outer loop is the widest one unless you name a vertex of another.
 """
 
 import cembench
@@ -12,13 +12,14 @@ surface = cembench.surface("holed-cap", 3_000, holes=3)
 print("vertices on the boundary loops:", [len(loop) for loop in surface.loops])
 
 # %%
-# The default for such surfaces moves centres and radii of the holes until the energy is least.
+# The algorithm recommended for this target moves centres and radii of the holes until the energy
+# is least.
 
-result = cembench.parameterize(surface)
+result = cembench.parameterize(surface, target="circular holes")
 figure = result.plot()
 
 # %%
-# :func:`cembench.holes` takes every algorithm that can do it. The first fills the holes and maps
+# :func:`cembench.holes` takes every algorithm that can do it, and one that fills the holes and maps
 # the disk, so that they come out as they may; the figure tells how far from circles.
 
 for name, found in cembench.holes(surface).items():

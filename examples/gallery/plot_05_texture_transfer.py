@@ -14,7 +14,7 @@ from cembench.conformal.resample import locate
 
 source = cembench.surface("spherical-cap", 12_000, angle=100.0)
 target = cembench.surface("hemi-ellipsoid", 12_000, x=1.0, y=1.0, z=1.8)
-from_source, from_target = cembench.parameterize(source), cembench.parameterize(target)
+from_source, from_target = (cembench.parameterize(one, target="disk") for one in (source, target))
 
 # %%
 # The texture of the source: rings about its top, and sectors.

@@ -32,7 +32,7 @@ result = cembench.parameterize(disk)
 figure = result.plot()
 
 # %%
-# Where the cut runs, on the torus and on the disk.
+# Where the cut runs, on the torus and in the plane.
 
 fig = plt.figure(figsize=(9, 4))
 left = fig.add_subplot(1, 2, 1, projection="3d")

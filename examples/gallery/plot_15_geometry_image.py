@@ -12,7 +12,7 @@ import numpy as np
 import cembench
 
 surface = cembench.surface("hemi-ellipsoid", 4_000)
-result = cembench.parameterize(surface)
+result = cembench.parameterize(surface, target="disk")
 
 # %%
 # 129 samples along each side; the disk is mapped to the square conformally.

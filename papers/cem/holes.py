@@ -110,6 +110,7 @@ def holes(
     """
     from cembench.registry import load_registry
     from cembench.results import exhibits, run_folder
+    from cembench.running.map_promises import WITH_HOLES
 
     from .holes_exhibits import examine_holes
 
@@ -118,7 +119,7 @@ def holes(
         run_folder.check(folder)
     mesh = loaded(surface, faces=faces, outer=outer)
     algorithms = [
-        a for a in load_registry().algorithms.values() if a.target == "circular holes" and a.usual
+        a for a in load_registry().algorithms.values() if a.target in WITH_HOLES and a.usual
     ]
     command = exhibits.command("holes", surface, mesh.name, outer=outer, sweeps=sweeps, faces=faces)
     with reporter.busy(f"Koebe's method on {mesh.name}") as tell:

@@ -279,7 +279,7 @@ def test_overlays_of_several_surfaces_go_to_one_file_or_to_several(cli, bumpy, g
 @pytest.mark.parametrize(
     ("options", "remedy"),
     [
-        ((), "direct-cem has no --overlay, .* use -a cetm-flips"),
+        ((), "plane has no --overlay, .* use -a cetm-flips"),
         (("-a", "cem"), "cem has no --overlay, .* use -a cetm-flips"),
         (("-a", "cetm-flips", "--cut"), "leave out --cut, and map what `cembench cut"),
         (("-a", "cetm-flips", "--bake", "paint.png", "-o", "x.obj"), "leave out --bake"),

@@ -36,7 +36,7 @@ def faults_of_map(uv: Sequence[complex], faces: Sequence[Face], target: str) -> 
     faces : sequence of triples
         Triangles, counter-clockwise on the surface.
     target : str
-        "disk", "circular holes" or "free boundary".
+        "disk", "circular holes", "disk with holes" or "free boundary".
 
     A free boundary may overlap itself (see :func:`overlaps`); everything else must not.
 

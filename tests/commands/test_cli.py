@@ -61,7 +61,7 @@ def test_map_takes_the_algorithm_that_fits_the_surface(cli, cap, tmp_path):
         json.loads(cli("map", file, "--json")[1])["algorithm"]
         for file in (cap, tmp_path / "holes.obj")
     ]
-    assert taken == ["direct-cem", "direct-cem-holes"]
+    assert taken == ["plane", "plane-holes"]
 
 
 def test_map_of_an_invalid_result_writes_nothing_and_exits_with_1(cli, cap):

@@ -287,7 +287,9 @@ def test_quiet_prints_errors_only(cli, cap):
 
 
 def test_map_prints_few_lines_and_all_of_them_on_request(cli, cap):
-    few, all_of_them = (cli("map", cap, "-o", f"{name}.obj", *more)[1] for name, more in MORE)
+    few, all_of_them = (
+        cli("map", cap, "--target", "disk", "-o", f"{name}.obj", *more)[1] for name, more in MORE
+    )
     assert len(few.splitlines()) == 5
     assert len(all_of_them.splitlines()) > 10
 

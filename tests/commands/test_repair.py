@@ -258,7 +258,7 @@ def test_disks_and_surfaces_with_holes_are_mapped_together(tmp_path, cli):
     code, out, err = cli("map", tmp_path / "disk.obj", tmp_path / "tube.obj", "--json")
     assert code in (0, 1), err
     items = [row["algorithm"] for row in json.loads(out)]
-    assert items == ["direct-cem", "direct-cem-holes"]
+    assert items == ["plane", "plane-holes"]
 
 
 def test_a_file_keeps_names_of_any_encoding(tmp_path, cli):

@@ -54,13 +54,14 @@ def test_settled_arcs_have_the_other_ones_proportions_where_they_crowd_and_keep_
     assert even.settled(even) is even
 
 
-def test_an_arc_too_short_to_count_is_not_held():
+def test_of_too_many_shortest_arcs_those_too_short_to_count_are_left_out():
     domain = CircleDomain.of_arcs(np.array([2.0, 1e-9, 1.0, 2.0]))
     there = domain.moved(np.array([0.0, 0.0, 2.0, -2.0]), np.zeros(1), np.zeros(1, complex))
     shrunk = CircleDomain(
         there.rims, there.least, there.turns, there.centres, there.radii, there.least
     )
-    assert shrunk.shortest.tolist() == [True, False, True, True]
+    assert shrunk.shortest(4).tolist() == [0, 1, 2, 3]
+    assert shrunk.shortest(3).tolist() == [0, 2, 3]
 
 
 @pytest.mark.parametrize("k", [1, 2])

@@ -7,7 +7,7 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh
 from cembench.conformal.beltrami import beltrami_coefficients
-from cembench.conformal.even_weights import _gradients, evened
+from cembench.conformal.even_weights import _gradients, evened, is_graded
 from cembench.conformal.metrics import angle_errors, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
 from tests import gallery
@@ -46,11 +46,19 @@ def test_each_step_lowers_the_mean_angle_error_and_keeps_the_map_valid(mesh):
 
 def test_on_a_graded_mesh_it_pays():
     mesh = graded(decades=3)
-    before, after = direct_cem(mesh), direct_cem(mesh, even=10)
+    before, after = direct_cem(mesh, even=0), direct_cem(mesh, even=10)
     ratio = angle_errors(mesh, after.uv).mean() / angle_errors(mesh, before.uv).mean()
     assert ratio < 0.985
     assert 1 <= after.extras["even_steps"] <= 10
     assert "even_steps" not in before.extras
+
+
+def test_by_default_steps_are_taken_on_graded_meshes_alone():
+    for mesh, steps in ((graded(decades=3), 2), (hard_surface(4), 0)):
+        assert is_graded(mesh) == bool(steps)
+        own = direct_cem(mesh)
+        assert own.extras.get("even_steps", 0) == steps
+        np.testing.assert_array_equal(own.uv, direct_cem(mesh, even=steps).uv)
 
 
 def test_a_conformal_map_stays():

@@ -54,7 +54,7 @@ def test_an_own_failure_is_recorded_and_told():
     note = quality_notes("disk", MapFigures(mesh, result.uv), result.extras)[0]
     assert note.kind is NoticeKind.LAST_RESORT
     assert "too crowded" in note.text
-    assert "abf-linear" in note.text
+    assert "--target plane" in note.text
 
 
 def test_a_valid_map_stays_as_it_is():

@@ -108,14 +108,15 @@ def test_holes_inside_out_or_outside_are_refused():
     assert FaultKind.FOLDED in kinds(nested, HOLED, "circular holes")
 
 
-def test_circles_out_of_the_disk_or_over_each_other_are_told():
+def test_circles_out_of_the_disk_or_over_each_other_are_faults():
     """Each hole is a circle, so that no figure of circularity would tell."""
     one, other = (k for k in HOLED.loops[:3] if np.abs(np.abs(HOLED_FLAT[k]) - 1).max() > 1e-6)
 
     def told(loop, shift):
         moved = HOLED_FLAT.copy()
         moved[loop] += shift
-        return [note.text for note in remarks(solver("circular holes"), HOLED, moved)]
+        found = faults(solver("circular holes"), HOLED, moved)
+        return [one.detail for one in found if one.kind is FaultKind.HOLES_NOT_CIRCULAR]
 
     assert told(one, 0) == []
     middles = HOLED_FLAT[one].mean(), HOLED_FLAT[other].mean()

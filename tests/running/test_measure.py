@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from cembench import HoledMesh, Parameterization, algorithm
+from cembench.results.records import FaultKind
 from cembench.running import map_checks
 from cembench.running.map_promises import faults
 from cembench.running.measure import check_cell
@@ -14,10 +15,10 @@ MESH = gallery.three_holes()
 FLAT = MESH.V[:, 0] + 1j * MESH.V[:, 1]
 
 
-def mapped(uv):
+def mapped(uv, target="circular holes"):
     """The outcome of an algorithm that answers with this map."""
 
-    @algorithm("given", title="Given", target="circular holes")
+    @algorithm("given", title="Given", target=target)
     def given(mesh: HoledMesh) -> Parameterization:
         return Parameterization(uv)
 
@@ -38,15 +39,18 @@ def test_round_holes_are_ok_and_reported_with_centres_and_radii():
     assert sorted(b.radius for b in found) == pytest.approx(sorted(gallery.THREE_HOLES[1]))
 
 
-def test_a_hole_that_is_no_circle_is_told_but_no_fault():
+def test_a_hole_that_is_no_circle_breaks_the_promise_of_circular_holes_alone():
     uv = FLAT.copy()
     loop = holes()[0]
     middle = uv[loop].mean()
     uv[loop] = middle + 0.999 * (uv[loop] - middle) + 0.02 * np.conj(uv[loop] - middle)
     outcome, _ = mapped(uv)
-    assert outcome.status == "ok"
-    assert "1 of 3 holes are not circles" in outcome.notes[0].text
+    assert outcome.status == "invalid"
+    assert [fault.kind for fault in outcome.faults] == [FaultKind.HOLES_NOT_CIRCULAR]
+    assert f"1 of 3 holes are not circles: that of vertex {loop.min()} is off by" in outcome.cause
     assert outcome.metrics["boundary_circularity"] > 0.01
+    outcome, _ = mapped(uv, "disk with holes")
+    assert outcome.status == "ok"
 
 
 def test_an_outer_boundary_off_the_unit_circle_is_invalid():

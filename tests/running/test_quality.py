@@ -40,14 +40,14 @@ def warped():
     return HoledMesh.from_arrays(np.stack([z.real, z.imag, 0 * z.real], axis=1), mesh.F)
 
 
-def eared_disk(count=15):
-    """A flat disk with long ears: triangles that hang on one boundary edge."""
+def eared_disk(count=15, length=8):
+    """A flat disk with ears: triangles that hang on one boundary edge."""
     mesh = flat_disk(200)
     V, F = [*mesh.V], [*mesh.F]
     for k in range(count):
         a, b = mesh.boundary[2 * k], mesh.boundary[2 * k + 1]
         F.append([b, a, len(V)])
-        V.append(8 * (mesh.V[a] + mesh.V[b]) / 2)
+        V.append(length * (mesh.V[a] + mesh.V[b]) / 2)
     return DiskMesh.from_arrays(np.array(V), np.array(F))
 
 
@@ -136,6 +136,9 @@ def test_a_crowded_end_is_never_passed_over():
 
 def test_causes_are_those_of_the_mesh_and_of_the_map():
     mesh = eared_disk()
+    needles = likely_causes(mesh, direct_cem(mesh).uv, {})
+    assert needles[0].startswith("needles (")  # the ears are long
+    mesh = eared_disk(length=1.3)
     causes = likely_causes(mesh, direct_cem(mesh).uv, {"fold_repairs": 3})
     assert "Definition 1" in causes[0]
     assert "3 solves" in causes[1]
@@ -152,11 +155,12 @@ def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_b
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
     monkeypatch.setattr("cembench.running.quality.free_map", lambda _: (np.inf, ""))
     (note,) = notes_on("disk", mesh, flat, {})
-    assert "hardly better in a harmonic map" in note.text
+    assert "with its boundary by harmonic measure" in note.text
     assert "too coarse" in note.text
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: None)
     (note,) = notes_on("disk", mesh, flat, {})
-    assert "hardly better in any map known here" in note.text
+    assert "and no other map was computed" in note.text
+    assert "Take -a best" in note.text
 
 
 @pytest.mark.parametrize("algorithm", ["direct-cem", "bff", "cetm-flips", "harmonic-circle"])
@@ -184,8 +188,8 @@ def test_a_poor_map_of_a_disk_whose_free_boundary_is_good_names_it(monkeypatch):
     assert COMPARED < angle_errors(mesh, poor).mean() < POOR
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: poor)
     (note,) = notes_on("disk", mesh, poor, {})
-    assert "a free boundary reaches" in note.text
-    assert "-a lscm" in note.text
+    assert "with a free boundary, as of -a lscm, it is" in note.text
+    assert "Take --target plane" in note.text
 
 
 def test_the_free_map_of_a_flat_surface_with_holes_is_itself():

@@ -6,6 +6,7 @@ from typing import Annotated
 import numpy as np
 from cembench.algorithms.cem import cem
 from cembench.algorithms.direct_cem.holes import direct_cem_holes
+from cembench.algorithms.harmonic_filled import harmonic_filled
 from pydantic import Field
 
 from cembench import AlgorithmFailed, DiskMesh, HoledMesh, Parameterization, algorithm
@@ -42,6 +43,11 @@ def round_when_small(mesh: HoledMesh) -> Parameterization:
 @algorithm("right", title="Right", target="disk")
 def right_one(mesh: DiskMesh) -> Parameterization:
     return cem(mesh)
+
+
+@algorithm("not-round", title="Leaves holes as they come", target="circular holes")
+def not_round(mesh: HoledMesh) -> Parameterization:
+    return harmonic_filled(mesh)
 
 
 @algorithm("not-combinatorial", title="Declares what is not so", target="disk", combinatorial=True)
