@@ -129,7 +129,7 @@ def test_what_remembers_its_calls_is_caught_in_the_rounds(here):
         (
             ":right",
             ("--against", "none"),
-            "unknown algorithm 'none'; known: abf++, abf-linear, angenent-haker, backslash,",
+            "unknown algorithm 'none'. Did you mean noise? Known: abf++, abf-linear,",
         ),
         (":right", ("--against", "koebe-cem"), "--against koebe-cem: right cannot be compared"),
         (":right", ("--surfaces", "catenoid-ring"), "which none of the chosen algorithms accepts"),
