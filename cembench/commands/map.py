@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     "cembench map scan.obj --repair -o scan_uv.obj  ·  cembench map head.obj --cut -o uv.obj  ·  "
     "cembench map a.obj b.obj -o maps/",
 )
-@from_api(map_files, without=("reporter",), meshes="MESH")
+@from_api(map_files, without=("reporter",), meshes="MESH", uv="--uv unit|square|world|disk")
 def map_(
     call: Call,
     *,
