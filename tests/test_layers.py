@@ -67,19 +67,19 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
-    "core": 2_120,
+    "core": 2_150,
     "mesh": 6_010,
     "linear_algebra": 1_540,
-    "conformal": 6_410,
+    "conformal": 6_360,
     "registry": 960,
-    "results": 5_020,
-    "running": 7_500,
-    "drawing": 1_500,
+    "results": 5_300,
+    "running": 7_620,
+    "drawing": 1_470,
     "report": 7_620,
-    "validation": 2_310,
-    "morphing": 1_350,
+    "validation": 2_450,
+    "morphing": 1_340,
     "api": 5_070,
-    "commands": 2_930,
+    "commands": 2_960,
 }
 
 
