@@ -31,11 +31,17 @@ def readme_answer(*, report: Path = KEPT) -> Section:
 
 
 def _verdicts(report: Path) -> str:
-    """Return how many claims hold over all surfaces of the report, and which do not."""
+    """Return how many claims hold on the report's models, and which do not."""
     with (report / "tables/claims-at-a-glance.csv").open(encoding="utf-8", newline="") as lines:
         claims = list(csv.DictReader(lines))
-    counts = Counter(claim["verdict"] for claim in claims)
-    failing = [claim["claim"].rstrip(".") for claim in claims if "not hold" in claim["verdict"]]
+    column = next(name for name in ("on the models", "verdict") if name in claims[0])
+    verdicts = [claim[column].partition(",")[0] for claim in claims]
+    counts = Counter(verdicts)
+    failing = [
+        claim["claim"].rstrip(".")
+        for claim, verdict in zip(claims, verdicts, strict=True)
+        if "not hold" in verdict
+    ]
     named = f" ({'; '.join(failing)})" if failing else ""
     return (
         f"Of all {len(claims)} claims, over these models and the stand-ins, {counts['holds']} "
