@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 import cembench
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
+from cembench.core.atomic import write_bytes, write_text
 
 LAYOUT = """
 | input | given to | answer | what it says or does |
@@ -196,7 +197,7 @@ def files() -> Iterator[Case]:
     """Yield the inputs that are files."""
 
     def obj(V: Points, F: Indices) -> Callable[[Path], object]:
-        return lambda path: path.write_text(text(V, F))
+        return lambda path: write_text(path, text(V, F))
 
     V, F = hill()
     yield "sphere of an exporter, seam and poles copied", ".obj", obj(*sphere()), "--repair --cut"
@@ -224,10 +225,10 @@ def files() -> Iterator[Case]:
     yield "degrees and metres", ".obj", obj(earth, F), ""
     thin = np.vstack([V, V + np.array([0, 0, 1e-7])]), np.vstack([F, F + len(V)])
     yield "two sheets 1e-7 apart", ".obj", obj(*thin), ""
-    yield "decimal commas", ".obj", lambda path: path.write_text(text(V, F).replace(".", ",")), ""
-    yield "compressed", ".obj.gz", lambda path: path.write_bytes(b"\x1f\x8b"), ""
-    yield "point cloud", ".ply", lambda path: path.write_text(POINTS), ""
-    yield "volume", ".nii.gz", lambda path: path.write_bytes(b"\x1f\x8b"), ""
+    yield "decimal commas", ".obj", lambda path: write_text(path, text(V, F).replace(".", ",")), ""
+    yield "compressed", ".obj.gz", lambda path: write_bytes(path, b"\x1f\x8b"), ""
+    yield "point cloud", ".ply", lambda path: write_text(path, POINTS), ""
+    yield "volume", ".nii.gz", lambda path: write_bytes(path, b"\x1f\x8b"), ""
     yield from _of_libraries(V, F)
 
 

@@ -18,9 +18,6 @@ import numpy as np
 import scipy
 from pydantic import Field
 
-from cembench.conformal.gauge import middle_triangle
-from cembench.conformal.laplacian import cotangent_laplacian, double_areas
-from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 from .implicit import Real
@@ -180,6 +177,9 @@ def _filtered(X: Real, V: Real, F: Faces, length: Real | float) -> Real:
 
     L and M are the mesh's cotangent Laplacian and vertex areas.
     """
+    from cembench.conformal.laplacian import cotangent_laplacian, double_areas
+    from cembench.linear_algebra.cholesky import Cholesky
+
     n = len(V)
     boundary = boundary_mask(F, n)
     mass = np.bincount(F.ravel(), np.repeat(double_areas(V, F) / 6, 3), n) / np.square(length)
@@ -238,6 +238,10 @@ def boundary_angles(V: Real, F: Faces, loop: Faces) -> Real:
 
     The middle triangle goes to the centre: an arc is as long as its harmonic measure from there.
     """
+    from cembench.conformal.gauge import middle_triangle
+    from cembench.conformal.laplacian import cotangent_laplacian
+    from cembench.linear_algebra.cholesky import Cholesky
+
     L = scipy.sparse.csr_array(cotangent_laplacian(V, F))
     inner = np.setdiff1d(np.arange(len(V)), loop)
     source = np.zeros(len(V))

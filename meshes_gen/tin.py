@@ -10,9 +10,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from pydantic import Field
-from scipy.spatial import Delaunay
 
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
@@ -105,7 +105,7 @@ def _triangulated(corners: Complex, points: Complex) -> tuple[Complex, NDArray[n
     sides = np.roll(corners, -1) - corners
     from_each = (points / INSIDE)[:, None] - corners
     plan = np.concatenate([corners, points[((np.conj(sides) * from_each).imag > 0).all(axis=1)]])
-    F = Delaunay(np.stack([plan.real, plan.imag], axis=1)).simplices.astype(np.int64)
+    F = scipy.spatial.Delaunay(np.stack([plan.real, plan.imag], axis=1)).simplices.astype(np.int64)
     a, b, c = (plan[F[:, k]] for k in range(3))
     clockwise = (np.conj(b - a) * (c - a)).imag < 0
     F[clockwise] = F[clockwise, ::-1]

@@ -56,7 +56,7 @@ def writes(call):
         given = [*call.args, *(keyword.value for keyword in call.keywords)]
         modes = [str(one.value) for one in given if isinstance(one, ast.Constant)]
         return any(set(mode) <= set("rwxabt+") and set(mode) & set("wxa+") for mode in modes)
-    if name == "replace":  # of a path it has one argument, of a text two, of a dataclass keywords
+    if name in ("replace", "rename"):  # of a path one argument; a text two, a frame keywords
         return owner == "os" or (method and len(call.args) == 1 and not call.keywords)
     if (not method and name in OURS) or owner in OUR_OBJECTS:
         return False

@@ -17,7 +17,7 @@ ALLOWED = {
 #: Values of enumerations and of Literal types that are written with a space, or a capital.
 DATA = {
     "circular holes", "free boundary", "harmonic measure", "too few rounds", "not claimed",
-    "Figure 2", "E_C", "at the outer boundary", "File",
+    "Figure 2", "E_C", "at the outer boundary", "File", "UNSTRUCTURED_GRID",
 }  # fmt: skip
 
 

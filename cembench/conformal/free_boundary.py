@@ -92,7 +92,7 @@ def unrolled(mesh: DiskMesh) -> Parameterization:
         uv[k] = uv[i] + lengths[t, (c + 2) % 3] * along * turn[t, c]
         waiting += [(t, int(g)) for g in twin[t] if g >= 0 and g // 3 != before]
     uv *= np.sqrt(np.pi / polygon_area(uv[mesh.boundary]))
-    return Parameterization(uv, extras={"unrolled": True})
+    return Parameterization(uv, extras={"unrolled": True, "folded_before_repair": 0})
 
 
 def with_area_pi(

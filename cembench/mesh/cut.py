@@ -212,7 +212,7 @@ def read_seams(path: Path) -> list[list[int]]:
 
     """
     try:
-        lines = path.read_text("utf-8").splitlines()
+        lines = path.read_text(encoding="utf-8").splitlines()
         rows = [line.partition("#")[0].replace(",", " ").split() for line in lines]
         return [[int(word) for word in row] for row in rows if row]
     except (OSError, ValueError):

@@ -191,12 +191,15 @@ def becomes_decreasing(history: Sequence[float]) -> bool:
 
 
 def steps_to_the_same(
-    history: Sequence[float], other: Sequence[float], percent: float
-) -> tuple[int, int, float]:
+    history: Sequence[float] | None, other: Sequence[float] | None, percent: float
+) -> tuple[int, int, float] | None:
     """Return the iterations of two histories to the higher of their last energies.
 
-    An energy within `percent` above it counts. The third value is the difference of the last ones.
+    An energy within `percent` above it counts. The third value is the difference of the last ones;
+    None unless there are both.
     """
+    if history is None or other is None:
+        return None
     goal = max(history[-1], other[-1]) * (1 + percent / 100)
     first, second = (
         next(k for k, energy in enumerate(energies) if energy <= goal)

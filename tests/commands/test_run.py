@@ -221,7 +221,7 @@ def test_a_record_knows_which_row_of_the_paper_its_surface_stands_for():
 
     sources = provenances(load_registry(), ["foot-stand-in", "flat-disk"])
     assert sources == {
-        "foot-stand-in": Provenance("Foot", "stand-in", family="foot-stand-in"),
+        "foot-stand-in": Provenance("Foot", "stand-in", family="foot-stand-in", fitted="fdm"),
         "flat-disk": Provenance(family="flat-disk"),
     }
 

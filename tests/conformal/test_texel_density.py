@@ -46,7 +46,7 @@ def test_a_part_without_texels_is_told_by_its_share():
         "undersampled_share": undersampled_share(areas, images, 10.0),
     }
     assert found["undersampled_share"] == pytest.approx(0.18)
-    assert "18 % of the surface gets less than one texel" in texture_words(found)
+    assert "18 % of the surface gets less than 1 texel" in texture_words(found)
     assert needs_islands(found)
 
 

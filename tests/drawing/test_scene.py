@@ -2,6 +2,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cembench.surfaces.catalogue import stand_in
+from cembench.surfaces.levers import NO_LEVERS
 
 from cembench.drawing import scene as look
 from cembench.drawing.camera import view_rotation
@@ -53,7 +55,7 @@ def test_relief_is_seen_obliquely_from_its_front():
 
 @pytest.mark.parametrize("name", ["nefertiti", "cowboy-hat", "bourbon-bottle"])
 def test_what_is_cut_along_z_is_seen_upright_as_if_y_were_up(name):
-    mesh = load_registry().surface(f"{name}-stand-in").function(2_000)
+    mesh = stand_in(f"{name}-stand-in", 2_000, levers=NO_LEVERS)
     right, up, toward = view_rotation(mesh)
     assert up[2] > 0.9
     assert toward[1] < -0.9  # a bust's face looks along -y

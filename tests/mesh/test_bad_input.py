@@ -87,8 +87,8 @@ def test_the_real_punctured_torus(cli):
     [
         (["-a", "nope"], "unknown algorithm 'nope'; known: .*cem.*harmonic-circle.*lscm"),
         (["-p", "speed=1"], "cem has no parameter|no chosen algorithm has a parameter 'speed'"),
-        (["-p", "max_iterations=-1"], "max_iterations='-1' is not allowed"),
-        (["-p", "tolerance=abc"], "tolerance='abc' is not allowed"),
+        (["-a", "cem", "-p", "max_iterations=-1"], "max_iterations='-1' is not allowed"),
+        (["-a", "cem", "-p", "tolerance=abc"], "tolerance='abc' is not allowed"),
         (["-p", "tolerance"], "not of the form NAME=VALUE"),
         (["-o", "a.off"], "cannot hold texture coordinates; allowed here: .obj, .ply"),
         (["-o", "no/where/a.obj"], "there is no folder"),

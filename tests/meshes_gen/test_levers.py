@@ -75,7 +75,8 @@ def test_jag_scatters_the_angles_of_the_boundary_and_leaves_the_rest(body):
 def test_smoothing_holds_the_boundary_and_lowers_the_angle_errors(body):
     smooth = hardened(body, Levers(smooth=4))
     np.testing.assert_array_equal(smooth.V[body.loops[0]], body.V[body.loops[0]])
-    errors = [cembench.parameterize(one, "fdm").angle_error_mean_deg for one in (body, smooth)]
+    maps = [cembench.parameterize(one, "fdm") for one in (body, smooth)]
+    errors = [one.metrics["angle_error_mean_deg"] for one in maps]
     assert errors[1] < errors[0]
 
 

@@ -112,7 +112,7 @@ def test_claims_over_any_surface_need_no_table_and_one_about_nothing_is_an_error
     paper = read_paper(folder(tables=""))
     with drawing_little():
         report = write_report(tmp_path / "run", tmp_path / "report", "c", paper=paper)
-    (claim,) = next(s for s in report.sections if s.name == "claims").items[1:]
+    (claim,) = next(s for s in report.sections if s.name == "claims").items[2:]
     assert claim.verdict == "holds"
     assert claim.counted.startswith("3 of 3")
     nothing = read_paper(folder(tables="", claims=CLAIM.replace('["cem"]', '["bff"]')))

@@ -143,7 +143,7 @@ def test_the_terminal_shows_four_tables_in_80_columns(written):
     text = printed(paper_tables(written[0]))
     assert all(f"Table {k}: " in text for k in (1, 2, 3, 4))
     assert max(map(len, text.splitlines())) <= 80
-    assert "1.00ˢ" in text
+    assert "1.00 ±0%ˢ" in text
     assert "failed" in text
 
 

@@ -138,7 +138,7 @@ def test_a_true_difference_is_found():
 
 
 def test_a_figure_is_unstable_where_its_interval_is_wide():
-    assert is_unstable(record_of([1, 1, 1, 1, 1, 1.12]))
+    assert is_unstable(record_of([1, 1, 1, 1, 1, 1.3]))
     assert not is_unstable(record_of([1, 1, 1, 1, 1, 1.09]))
     assert not is_unstable(record_of([1, 2]))
 

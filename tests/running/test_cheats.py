@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from cembench.surfaces.catalogue import stand_in
+from cembench.surfaces.levers import NO_LEVERS
 
 from cembench.core.notices import NoticeKind, of_kind
 from cembench.registry import load_registry
@@ -14,7 +16,6 @@ from cembench.results.store import Store
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
-from cembench.running.surfaces import generate_surface
 from cembench.validation.examine import ValidationOptions, examine
 from cembench.validation.quality import quality_findings
 from cembench.validation.solver import Solver, load_solver
@@ -75,7 +76,7 @@ SINGLE = (
 @pytest.fixture
 def surface(tmp_path, monkeypatch):
     """A surface that one of the solvers knows, and a folder where others may keep maps."""
-    mesh = generate_surface(load_registry(), "cowboy-hat-stand-in", 1200)
+    mesh = stand_in("cowboy-hat-stand-in", 1200, levers=NO_LEVERS)
     file = tmp_path / "known.npz"
     np.savez(file, V=mesh.V, F=mesh.F)
     monkeypatch.setenv("CHEATS_SURFACE", str(file))
