@@ -45,7 +45,36 @@ class Recipe:
     last_rounds: int = 5
 
 
-RECIPES: dict[str, Recipe] = {}
+def _recipe(varied: str, rounds: int = 8, **start: float) -> Recipe:
+    return Recipe(tuple(varied.split()), Levers(centred=True, **start), rounds)
+
+
+#: Rows whose printed mean is below that of the body are smoothed, others are roughened.
+_SMOOTHER, _ROUGHER = "jag smooth even", "jag gain non_delaunay"
+RECIPES: dict[str, Recipe] = {
+    "nefertiti-stand-in": _recipe(_SMOOTHER, jag=0.2, smooth=12, even=0.5, cut=0.5),
+    "cowboy-hat-stand-in": _recipe("jag smooth non_delaunay", jag=0.02, smooth=8, non_delaunay=0.1),
+    "chinese-vase-stand-in": _recipe(_ROUGHER, jag=0.4, non_delaunay=0.11, gain=1.7),
+    "bourbon-bottle-stand-in": _recipe(
+        "jag smooth non_delaunay", jag=0.02, smooth=6, non_delaunay=0.2
+    ),
+    "foot-stand-in": _recipe(_SMOOTHER, jag=0.2, smooth=4, even=1, cut=0.34),
+    "chinese-lion-stand-in": _recipe(_SMOOTHER, jag=0.75, smooth=0.7, even=1.3),
+    "david-head-stand-in": _recipe(_ROUGHER, jag=0.1, non_delaunay=0.2, gain=1.7),
+    "stanford-bunny-stand-in": _recipe(_ROUGHER, jag=0.88, gain=0.54, non_delaunay=0.03),
+    "human-brain-stand-in": _recipe(_SMOOTHER, jag=0.45, smooth=0.1, even=1.2),
+    "ho-pouting-face-stand-in": _recipe(_SMOOTHER, jag=0.5, smooth=3, even=0.7),
+    "ho-neutral-face-stand-in": _recipe(_SMOOTHER, jag=0.5, smooth=3, even=0.7),
+    "left-hand-stand-in": _recipe(_SMOOTHER, jag=0.58, smooth=3, even=0.9),
+    "statue-of-liberty-stand-in": _recipe(_ROUGHER, jag=0.2, gain=1.8, non_delaunay=0.03),
+    "liu-neutral-face-stand-in": _recipe(_SMOOTHER, jag=0.8, smooth=22, even=0.3),
+    "liu-smile-face-stand-in": _recipe(_SMOOTHER, jag=0.8, smooth=16, even=0.2),
+    "liu-pouting-face-stand-in": _recipe(_SMOOTHER, jag=0.8, smooth=16, even=0.2),
+    "liu-wry-face-stand-in": _recipe(_SMOOTHER, jag=0.8, smooth=16, even=0.2),
+    "isis-statue-stand-in": _recipe(_SMOOTHER, jag=0.5, smooth=5, even=0.7),
+    "bimba-statue-stand-in": _recipe(_ROUGHER, jag=0.5, gain=1.1, non_delaunay=0.02),
+    "knit-cap-man-stand-in": _recipe(_SMOOTHER, 5, jag=1.28, smooth=0.25, even=1.9),
+}
 #: Cheaper than FDM, and with nearly its figures: the first rounds are by it.
 QUICK = "direct-cem"
 #: The largest error of a figure, as a logarithm, at which a fit ends.

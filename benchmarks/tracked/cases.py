@@ -24,10 +24,11 @@ from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.conformal.metrics import all_metrics
 from cembench.registry import load_registry
-from cembench.running.surfaces import generate_surface
 
 VARIABLE = "CEMBENCH_TRACK"
 
+#: How jagged the boundaries of tracked surfaces are.
+JAG = 0.5
 #: A round surface, and a steep one whose map shrinks its middle.
 DISKS = ("spherical-cap", "hemi-ellipsoid")
 #: A long one, and one with corners.
@@ -52,8 +53,14 @@ def everything_is_asked_for() -> bool:
 
 @lru_cache(maxsize=4)
 def surface(name: str, faces: int) -> TriangleMesh:
-    """The surface of this name with about this many triangles; the same one at every call."""
-    return generate_surface(load_registry(), name, faces)
+    """The surface of this name with about this many triangles; the same one at every call.
+
+    Its boundary is as ragged as those of scans, where it can be.
+    """
+    family = load_registry().surface(name)
+    harder = {"jag": JAG} if "jag" in {one.name for one in family.parameters} else {}
+    mesh: TriangleMesh = family.function(**family.arguments({"faces": faces} | harder))
+    return mesh
 
 
 def real_disks() -> list[str]:
