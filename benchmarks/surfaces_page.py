@@ -125,7 +125,8 @@ def in_print(model: str) -> dict[str, Any]:
 def measured(mesh: TriangleMesh, model: str = "") -> dict[str, Any]:
     """Return the same figures of a surface; of a model, by the algorithms as the paper ran them."""
     mappers = [load_registry().algorithm(name) for name in ALGORITHMS]
-    arguments = distribute_parameters(mappers, PAPER.as_printed(model, mappers))
+    printed = PAPER.as_printed(model, mappers) if model else {}
+    arguments = distribute_parameters(mappers, printed)
     found: dict[str, Any] = {}
     for mapper in mappers:
         result = mapper.function(mesh.fresh(), **arguments[mapper.name])
