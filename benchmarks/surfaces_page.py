@@ -9,8 +9,8 @@ from statistics import fmean, pstdev
 from typing import Any
 
 import numpy as np
-from cembench.surfaces.catalogue import stand_in
-from cembench.surfaces.levers import NO_LEVERS
+from cembench.surfaces.catalogue import body_mesh, stand_in
+from cembench.surfaces.levers import NO_LEVERS, hardened
 from cembench.surfaces.rows import ROWS
 
 from benchmarks.measuring import progress
@@ -229,9 +229,10 @@ def boundary_corners(mesh: TriangleMesh) -> np.ndarray[Any, np.dtype[np.float64]
 
 
 def spread_of(name: str) -> dict[str, Any]:
-    """Return the figures of a stand-in's first ten seeds over the printed ones, as ranges."""
-    wanted = in_print(ROWS[name].model)
-    found = [measured(stand_in(name, seed=seed)) for seed in range(SEEDS)]
+    """Return the figures of ten seeds of a stand-in's levers over the printed ones, as ranges."""
+    row, wanted = ROWS[name], in_print(ROWS[name].model)
+    body = body_mesh(name, row.faces, cut=row.levers.cut)
+    found = [measured(hardened(body, row.levers, seed)) for seed in range(SEEDS)]
 
     def ranges(algorithm: str) -> list[str]:
         ratios = np.array([one[algorithm] for one in found]) / np.array(wanted[algorithm])
