@@ -76,7 +76,7 @@ BUDGETS = {
     "running": 7_810,
     "drawing": 1_480,
     "report": 8_470,
-    "validation": 2_530,
+    "validation": 2_520,
     "morphing": 1_350,
     "api": 5_450,
     "commands": 3_100,

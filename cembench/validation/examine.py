@@ -28,7 +28,6 @@ from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import (
     comparison_with,
     folds_on,
-    held_to_promise,
     maps_every_surface,
     quality_findings,
     together,
@@ -214,8 +213,7 @@ class _Work:
         tasks = plan_cells(chosen, meshes, parameters, *plan)
         options = replace(self.asked.options, fresh=True)
         with self.hooks.watcher(len(tasks)) as watcher:
-            records = run_tasks(tasks, Store(self.folder / stage), options, watcher)
-        return [held_to_promise(record) for record in records]
+            return run_tasks(tasks, Store(self.folder / stage), options, watcher)
 
 
 #: What a stage finds, its figures, and its records of our algorithm.

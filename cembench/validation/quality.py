@@ -1,7 +1,7 @@
 """Stage 3: quality and speed against a baseline, paired by surface and by round.
 
 Quality: the ratio of a figure on each surface of which both maps keep the whole promise of their
-target (:func:`held_to_promise`). A surface counts as lower or higher if the ratio is more than 1 %
+target. A surface counts as lower or higher if the ratio is more than 1 %
 off 1; the median ratio has the order interval of :mod:`cembench.results.intervals` over the
 surfaces, none for fewer than six.
 
@@ -32,7 +32,7 @@ from cembench.results.comparison import (
 from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
-from cembench.results.records import Fault, FaultKind, Record, not_ok
+from cembench.results.records import FaultKind, Record
 from cembench.validation.finding import Stage, ValidationFinding, finding
 
 #: Ratios this close to 1 are ties.
@@ -140,20 +140,6 @@ class BaselineComparison(BaseModel):
         if self.common_gauge:
             return "E_C in the common gauge"
         return "E_C by area" if self.relative else "E_C"
-
-
-def held_to_promise(record: Record) -> Record:
-    """Return a record that is invalid if its map breaks any promise of its target.
-
-    A run reports holes that are not round in a notice, for algorithms that come close to circles.
-    A validation asks whether an algorithm does what it declares.
-    """
-    broken = of_kind(NoticeKind.HOLES_NOT_CIRCULAR, record.outcome.notes)
-    if record.outcome.status != "ok" or not broken:
-        return record
-    faults = [Fault(kind=FaultKind.OFF_CIRCLE, detail=str(notice)) for notice in broken]
-    about = {"metrics": record.outcome.metrics, "notes": record.outcome.notes}
-    return record.model_copy(update={"outcome": not_ok("invalid", *faults, **about)})
 
 
 def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> BaselineComparison:
