@@ -8,16 +8,18 @@ from .implicit import Body, Real, bump, join, meet
 
 
 def cowboy_hat_body(seed: int = 0) -> Body:
-    """A cowboy hat, open at the head; `seed` only turns the creases slightly."""
+    """A cowboy hat without its underside; `seed` only turns the creases slightly."""
     tilt = 0.02 * np.sin(seed)
+
+    def above_the_brim(x: Real, y: Real, z: Real) -> Real:
+        # The sides rise steeply, front and back dip.
+        return z - 0.93 * np.clip(np.abs(x) - 0.62, 0, None) ** 1.6 + 0.10 * (y / 1.6) ** 2
 
     def brim(p: Real) -> Real:
         x, y, z = p.T
         r = np.hypot(x / 1.35, y / 1.65)
-        # The sides rise steeply, front and back dip.
-        height = 0.62 * np.clip(np.abs(x) - 0.62, 0, None) ** 1.6 * 1.5 - 0.10 * (y / 1.6) ** 2
         slope = 1 + 0.9 * np.clip(np.abs(x) - 0.6, 0, 1)
-        slab = np.abs(z - height) / slope - 0.075
+        slab = np.abs(above_the_brim(x, y, z)) / slope - 0.075
         return meet(slab, (r - 1) * 1.3, 0.06)
 
     def crown(p: Real) -> Real:
@@ -38,7 +40,7 @@ def cowboy_hat_body(seed: int = 0) -> Body:
         return d - 0.028 * band
 
     def keep(p: Real) -> Real:
-        opening = np.hypot(p[:, 0] / 0.60, p[:, 1] / 0.78) - 1
-        return np.maximum(opening * 0.6, p[:, 2] - 0.2)
+        x, y, z = p.T
+        return np.minimum(above_the_brim(x, y, z), 0.93 - np.hypot(x / 1.35, y / 1.65))
 
     return Body(f, keep, (-1.6, -1.85, -0.55), (1.6, 1.85, 1.4), 150)

@@ -72,9 +72,9 @@ def test_stand_in_meets_its_row(name: str) -> None:
     assert check["ok"]
     assert mesh.notices == ()
     assert non_delaunay_share(mesh) < ROWS[name].levers.non_delaunay + 2e-3
-    # Not a height field over a disk: in no direction does the whole surface face one way. The model
-    # of Nefertiti is one.
-    assert _tilt(mesh) > 0.002 or name == "nefertiti-stand-in"
+    # Not a height field over a disk: in no direction does the whole surface face one way. Models
+    # that are: Nefertiti and the hat.
+    assert _tilt(mesh) > 0.002 or name in ("nefertiti-stand-in", "cowboy-hat-stand-in")
     uv = cem(mesh).uv
     assert flipped_triangles(mesh, uv) == 0
     if name in HARD:

@@ -137,7 +137,8 @@ def reached(name):
     row = ROWS[name]
     mapper = load_registry().algorithm(row.fitted)
     mesh = catalogue.stand_in(name)
-    assert (mesh.m, len(mesh.loops[0])) == (row.faces, row.boundary)
+    body = catalogue.body_mesh(name, row.faces, cut=row.levers.cut)
+    assert (mesh.n, mesh.m, mesh.loops[0].size) == (body.n, body.m, body.loops[0].size)
     found = all_metrics(mesh, mapper.function(mesh, **mapper.arguments({})).uv)
     return {figure: found[figure] for figure in FITTED}
 
