@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.fold_repair import accepted_repair
-from cembench.conformal.free_boundary import with_area_pi
-from cembench.conformal.planar import crossing_polygons
+from cembench.conformal.planar import bounds_once
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import algorithm
@@ -75,7 +74,7 @@ def plane(mesh: DiskMesh, *, work: Work = USUAL_WORK, repair: bool = True) -> Pa
     For textures: a free boundary has smaller angle errors than the disk, and much more even areas.
     The map is that of bff-free or abf-linear, whichever has the smaller mean angle error; if they
     are within 1 %, the one with the more even texel density. Where each has folds, a boundary that
-    crosses itself, or more than 10 degrees, scp and lscm are tried, and at last direct-cem, whose
+    overlaps itself, or more than 10 degrees, scp and lscm are tried, and at last direct-cem, whose
     map to the disk is always valid (`instead_of`). `chosen`, `tried` and `work` are as in best: on
     larger surfaces bff-free is tried alone first.
     """
@@ -106,12 +105,10 @@ def _in_the_plane(
     made = best_of(mesh, tiers, work, _overlap, repair=repair)
     if made.extras["chosen"] not in tiers[-1]:
         return made
-    uv, _ = with_area_pi(mesh, made.uv, repair=False)
-    extras = made.extras | {"instead_of": "a map with a free boundary"}
-    return replace(made, uv=uv, extras=extras)
+    return replace(made, extras=made.extras | {"instead_of": "a map with a free boundary"})
 
 
 def _overlap(mesh: TriangleMesh, z: Complex) -> str:
     """Return what is wrong with a map without folds whose image overlaps itself; else ""."""
-    crosses = crossing_polygons([z[loop] for loop in mesh.loops]) is not None
-    return "overlaps itself" if crosses else ""
+    overlaps = not bounds_once([z[loop] for loop in mesh.loops])
+    return "overlaps itself" if overlaps else ""

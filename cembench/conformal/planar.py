@@ -143,13 +143,24 @@ def crossing_polygons(curves: Sequence[Complex]) -> tuple[int, int] | None:
     return None
 
 
+def bounds_once(curves: Sequence[Complex]) -> bool:
+    """Whether closed polygons bound a region that covers no point twice, if nothing is folded.
+
+    They must not cross, and all but the outer one must be holes: about a branch point, boundaries
+    that do not cross can have the region inside two of them.
+    """
+    areas = np.array([polygon_area(z) for z in curves])
+    holes = np.count_nonzero(areas * areas.sum() <= 0)
+    return bool(holes == len(curves) - 1) and crossing_polygons(curves) is None
+
+
 def overlap_share(curves: Sequence[Complex]) -> float:
     """Return the share of a region that lies over other parts of it, from its boundary alone.
 
     The curves are the closed polygons that bound the region, holes clockwise. Without folds, a
     point with winding number w is covered w times, of which w - 1 are too many. The share is the
-    area of these over the area of all layers; 0 if the curves do not cross, infinite if they cross
-    more than :data:`MOST_CROSSINGS` times or enclose nothing.
+    area of these over the area of all layers; infinite if the curves cross more than
+    :data:`MOST_CROSSINGS` times or enclose nothing.
 
     Examples
     --------
@@ -161,27 +172,36 @@ def overlap_share(curves: Sequence[Complex]) -> float:
     True
 
     """
-    if crossing_polygons(curves) is None:
+    if bounds_once(curves):
         return 0.0
-    import shapely
-
     starts = np.concatenate(curves)
     ends = np.concatenate([np.roll(z, -1) for z in curves])
     if sum(polygon_area(z) for z in curves) < 0:
         starts, ends = np.conj(starts), np.conj(ends)
+    covered, over = layered_areas(starts, ends)
+    return over / covered if covered > 0 else float("inf")
+
+
+def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
+    """Return the area of all layers that closed curves bound, and of the layers above the lowest.
+
+    The curves are given by their sides, from `starts` to `ends` (b,), the region to their left.
+    Both are NaN if sides cross more than :data:`MOST_CROSSINGS` times.
+    """
+    import shapely
+
     sides = shapely.linestrings(
         np.stack([starts.real, ends.real], axis=1), np.stack([starts.imag, ends.imag], axis=1)
     )
     meeting = shapely.STRtree(sides).query(sides, predicate="intersects").shape[1]
     if (meeting - 3 * len(sides)) / 2 > MOST_CROSSINGS:  # each side meets itself and its neighbours
-        return float("inf")
+        return float("nan"), float("nan")
     faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(sides)]))
     inside = shapely.point_on_surface(faces)
     layers = windings(shapely.get_x(inside) + 1j * shapely.get_y(inside), starts, ends)
     areas = shapely.area(faces)
     covered = float((np.maximum(layers, 0) * areas).sum())
-    over = float((np.maximum(layers - 1, 0) * areas).sum())
-    return over / covered if covered > 0 else float("inf")
+    return covered, float((np.maximum(layers - 1, 0) * areas).sum())
 
 
 def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int64]:

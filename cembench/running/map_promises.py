@@ -139,7 +139,7 @@ def remarks(algorithm: Algorithm | Promise, mesh: TriangleMesh, uv: Complex) -> 
         return []
     return [
         Notice(NoticeKind.IMAGE_OVERLAPS, f"the image overlaps itself: {fault.detail}")
-        for fault in _crossings(mesh, uv)
+        for fault in (*_crossings(mesh, uv), *_turned_holes(mesh, uv))
     ]
 
 

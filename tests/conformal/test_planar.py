@@ -5,10 +5,12 @@ import pytest
 
 from cembench.conformal.planar import (
     backward_arcs,
+    bounds_once,
     crossing_polygons,
     fitted_circle,
     folded_triangles,
     orientations,
+    overlap_share,
     polygon_area,
     signed_areas,
     turns,
@@ -189,3 +191,13 @@ def test_no_circle_is_fitted_to_points_that_are_no_numbers():
 )
 def test_a_winding_number_in_words(winding, words):
     assert winding_words(winding) == words
+
+
+def test_boundaries_that_do_not_cross_can_bound_a_region_twice():
+    """About a branch point; the image has no folds, and no boundary crosses another."""
+    ring = np.exp(2j * np.pi * np.arange(60) / 60)
+    assert bounds_once([2 * ring, ring.conj()])
+    assert bounds_once([2 * ring.conj(), ring])
+    assert overlap_share([2 * ring, ring.conj()]) == 0
+    assert not bounds_once([2 * ring, ring])
+    assert overlap_share([2 * ring, ring]) == pytest.approx(0.2)
