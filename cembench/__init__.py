@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from cembench.api.fetch import PublicSurfaces as PublicSurfaces
     from cembench.api.fetch import fetch as fetch
     from cembench.api.map_files import map_files as map_files
+    from cembench.api.measure import measure as measure
     from cembench.api.morph_surfaces import morph as morph
     from cembench.api.papers import check_paper as check_paper
     from cembench.api.parameterize import Result as Result
@@ -95,6 +96,7 @@ _PLACES = {
     "cembench.api.cut": ("cut",),
     "cembench.api.fetch": ("PublicSurfaces", "fetch"),
     "cembench.api.map_files": ("map_files",),
+    "cembench.api.measure": ("measure",),
     "cembench.api.morph_surfaces": ("morph",),
     "cembench.api.parameterize": ("Result", "parameterize"),
     "cembench.api.parameterize_many": ("parameterize_many",),

@@ -22,6 +22,7 @@ from cembench.commands.exit_codes import Verbs, ending
 MODULES = {
     "catalogue": {"list": "api.catalogue:catalogue", "doctor": "commands.catalogue:doctor"},
     "map": {"map": "api.map_files:map_files"},
+    "measure": {"measure": "api.measure:measure"},
     "benchmark": {"run": "api.benchmark:benchmark"},
     "report": {"report": "api.benchmark:report"},
     "reproduce": {"reproduce": "api.reproduce:reproduce"},

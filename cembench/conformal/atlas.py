@@ -13,14 +13,11 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.metrics import METRICS, MapFigures, Metric, computed
 from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.core.arrays import Complex, Indices, Mask
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: Metrics that do not apply to an atlas, whose outline is not meant to be round.
 _NOT_OF_AN_ATLAS = ("boundary_circularity", "common_gauge_energy", "overlap_share")
@@ -42,9 +39,11 @@ class CutMap:
         The edges of the uncut surface that are seams, by its vertices.
     seam_length : float
         Total length of the seams, in the units of the surface.
-    mirrored : int
-        Number of islands that were mirrored. In `uv` they are mirrored back, to distinguish them
-        from folds and to keep the sign of angles.
+    turned : bool (islands,)
+        The islands that were mirrored. In `uv` they are mirrored back, to distinguish them from
+        folds and to keep the sign of angles.
+    given : complex128 (k,)
+        The images as they were given.
 
     """
 
@@ -53,12 +52,18 @@ class CutMap:
     island: Indices
     seams: Indices
     seam_length: float
-    mirrored: int
+    turned: Mask
+    given: Complex
 
     @property
     def islands(self) -> int:
         """Number of islands."""
         return int(self.island.max()) + 1
+
+    @property
+    def mirrored(self) -> int:
+        """Number of islands that were mirrored."""
+        return int(self.turned.sum())
 
 
 def laid_out(mesh: TriangleMesh, corners: Complex) -> tuple[TriangleMesh, Complex]:
@@ -79,12 +84,13 @@ def cut_map(mesh: TriangleMesh, corners: Complex) -> CutMap:
     surface = TriangleMesh.trusted(mesh.V[unique[0].astype(np.int64)], G, mesh.name)
     island, seams = _islands_and_seams(F, G)
     length = float(np.linalg.norm(mesh.V[seams[:, 0]] - mesh.V[seams[:, 1]], axis=1).sum())
-    uv = unique[1] + 1j * unique[2]
-    areas = np.bincount(island, np.nan_to_num(signed_areas(uv, G)))
+    given = unique[1] + 1j * unique[2]
+    areas = np.bincount(island, np.nan_to_num(signed_areas(given, G)))
     turned = areas < 0
     of_turned = np.unique(G[turned[island]])
+    uv = given.copy()
     uv[of_turned] = uv[of_turned].conj()
-    return CutMap(surface, uv, island, seams, length, int(turned.sum()))
+    return CutMap(surface, uv, island, seams, length, turned, given)
 
 
 def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
@@ -157,6 +163,10 @@ ATLAS_METRICS: tuple[Metric, ...] = (
 
 def atlas_metrics(mesh: TriangleMesh, corners: Complex) -> dict[str, float | int]:
     """Return all metrics of an atlas, by their keys in records."""
-    figures = AtlasFigures(cut_map(mesh, corners))
+    return metrics_of(AtlasFigures(cut_map(mesh, corners)))
+
+
+def metrics_of(figures: AtlasFigures) -> dict[str, float | int]:
+    """Return the same of a surface that was cut before."""
     chosen = [metric for metric in METRICS if metric.name not in _NOT_OF_AN_ATLAS]
     return computed((*chosen, *ATLAS_METRICS), figures)

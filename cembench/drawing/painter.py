@@ -45,6 +45,8 @@ EDGE, EDGE_COLOUR, BETWEEN = 0.5 * SAMPLES, (0.16, 0.25, 0.36), (0.93, 0.94, 0.9
 #: Curvature from inwards over flat to outwards: blue, white, orange; distinct in grey scale and for
 #: colour-blind readers.
 INWARDS, EVEN, OUTWARDS = (0.13, 0.33, 0.62), (0.96, 0.96, 0.94), (0.80, 0.35, 0.05)
+#: The darkest colour of angle errors, and the error in degrees from which on it is used.
+WORST, ANGLE_SCALE = (0.55, 0.0, 0.15), 30.0
 #: The colour scale ends at this quantile of the absolute curvature.
 EXTREME = 0.95
 
@@ -169,6 +171,12 @@ def curvature(panel: Panel, H: Real) -> Colouring:
         return np.array(EVEN) + np.abs(share)[:, None] * (towards - np.array(EVEN))
 
     return colouring
+
+
+def angle_colours(errors: Real) -> Colouring:
+    """Colour triangles by their angle errors (m,) in degrees, from white to dark red."""
+    shares = np.sqrt(np.clip(errors / ANGLE_SCALE, 0, 1))
+    return lambda raster: _between(EVEN, WORST, shares[raster.face])
 
 
 def edges(panel: Panel) -> Colouring:

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.core.arrays import Complex, Picture
+from cembench.conformal.metrics import angle_errors
+from cembench.core.arrays import Complex, Mask, Picture
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.drawing import compose, painter, scene
@@ -86,9 +87,34 @@ def preview_png(
     surface, image, board = _draw(mesh, uv, compose.panel_side(size))
     outline = scene.image_in_window(uv)[:, :2]
     loops = tuple(outline[loop] for loop in mesh.loops)
-    overlay = compose.Overlay(loops, scene.small_folds(uv, mesh.F))
+    overlay = compose.Overlay(loops, scene.small_folds(uv, mesh.F[scene.folded_by(uv, mesh.F)]))
     words = (title, caption, _note(board.squares.depth, turned=turned))
     return compose.page(surface, image, overlay, words, size)
+
+
+def write_distortion(
+    mesh: TriangleMesh, uv: Complex, folded: Mask, path: Path, words: tuple[str, str]
+) -> None:
+    """Draw a surface and its image, coloured by the angle error, into a PNG file.
+
+    White is none, dark red :data:`~cembench.drawing.painter.ANGLE_SCALE` degrees or more in the
+    mean of a triangle's corners. The triangles that are `folded` (m,) are drawn as in
+    :func:`write_preview`, whose errors it raises; `words` are a title and a caption.
+    """
+    _check(mesh, uv, SIZE)
+    space, side = scene.surface_in_window(mesh), compose.panel_side(SIZE)
+    colouring = painter.angle_colours(angle_errors(mesh, uv).mean(axis=1))
+    surface, image = (
+        painter.paint(panel, colouring, folded)
+        for panel in (
+            painter.surface_panel(mesh.F, space, side),
+            painter.image_panel(mesh.F, space, uv, folded, side),
+        )
+    )
+    overlay = compose.Overlay((), scene.small_folds(uv, mesh.F[folded]))
+    note = f"Angle error: white 0, dark red {painter.ANGLE_SCALE:.0f} degrees and above."
+    png = compose.page(surface, image, overlay, (*words, note), SIZE)
+    write_bytes(path, png, error=RenderError, parents=False)
 
 
 def write_thumbnail(mesh: TriangleMesh, uv: Complex, path: Path, *, side: int = THUMBNAIL) -> None:

@@ -81,8 +81,8 @@ def folded_by(uv: Complex, F: Ints) -> NDArray[np.bool_]:
 
 
 def small_folds(uv: Complex, F: Ints) -> Real:
-    """Return the centres (k, 2) of folds that are too small to be seen in the image."""
-    corners = image_in_window(uv)[F[folded_by(uv, F)]][:, :, :2]
+    """Return the centres (k, 2) of those folds F (j, 3) that are too small to be seen."""
+    corners = image_in_window(uv)[F][:, :, :2]
     return corners[np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2].mean(axis=1)
 
 

@@ -13,6 +13,7 @@ import os
 import stat
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -156,6 +157,32 @@ def read_soup(
             f"{path}: the file cannot be read ({error.strerror or error}). Check its permissions "
             "and the disk."
         ) from error
+
+
+def read_soup_with_uv(path: str | os.PathLike[str]) -> Soup:
+    """Read a file with its texture coordinates, of vertices or of corners.
+
+    Raises
+    ------
+    MeshError
+        As for :func:`read_soup`, or the file holds none.
+
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    soup = read_soup(path, uv=suffix in WITH_UV and suffix not in _OF_ARRAYS)
+    if suffix in _OF_ARRAYS:
+        try:
+            held = _OF_ARRAYS[suffix](path, uv=True)
+        except MeshError as error:
+            raise located(error, path) from None
+        soup = replace(soup, uv=held.uv, uv_index=held.uv_index if len(held.sizes) else None)
+    if soup.uv is None or not len(soup.uv):
+        raise MeshError(
+            f"{path}: it holds no UVs. Unwrap the surface and export it with them, as "
+            f"{', '.join(WITH_UV)}; or map it with cembench."
+        )
+    return soup
 
 
 def _library_reader(suffix: str) -> Callable[..., Soup] | None:

@@ -1,0 +1,90 @@
+"""The command `measure`: how good are these UVs?"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from cembench.api.measure import Measurement
+from cembench.api.measure import measure as measure_uv
+from cembench.commands.app import app
+from cembench.commands.console import SHOWN, Json, note, out, print_json, print_pair
+from cembench.commands.from_api import Call, from_api
+
+#: Figures that are printed without --verbose, in this order, with their headings.
+FEW = {
+    "angle_error_mean_deg": "mean angle error, degrees",
+    "angle_error_sd_deg": "SD of angle errors",
+    "flipped_triangles": "folded triangles",
+    "symmetric_dirichlet": "symmetric Dirichlet energy (4: isometry)",
+    "area_distortion_mean": "mean area distortion",
+    "texel_density_ratio": "texel density, largest : smallest",
+    "islands": "islands",
+    "mirrored_islands": "mirrored islands",
+    "seam_length": "seam length",
+    "overlap_inside_islands": "overlap inside islands, share of the image",
+    "overlap_between_islands": "overlap between islands",
+    "covered_share": "share of the square that is covered",
+    "tiles": "tiles (UDIM)",
+}
+
+
+@app.command(
+    epilog="Examples:  cembench measure model.obj  ·  "
+    "cembench measure model.glb --against best --preview distortion.png  ·  "
+    "cembench measure a.obj b.ply --json"
+)
+@from_api(measure_uv, without=("surface", "faces_and_uv", "reporter"))
+def measure(
+    call: Call,
+    meshes: Annotated[
+        list[Path],
+        typer.Argument(metavar="MESH...", help="Files with UVs: OBJ, PLY, GLB ..."),
+    ],
+    *,
+    preview: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.png", help="Draw the angle error on the surface (one file)."),
+    ] = None,
+    verbose: Annotated[bool, typer.Option("--verbose", "-v", help="Print all figures.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Print the answer, the figures and the worst places of each file."""
+    from cembench.core.errors import ParameterError
+    from cembench.core.overwriting import refuse_inputs
+
+    if preview:
+        if len(meshes) > 1 or preview.suffix.lower() != ".png":
+            raise ParameterError("--preview names one PNG file, for one mesh.")
+        refuse_inputs(preview, meshes, force=False)
+    found = []
+    for path in meshes:
+        one = call(path, reporter=SHOWN)
+        found.append(one.as_dict() | {"file": str(path)})
+        if preview:
+            one.plot(preview)
+        if not as_json:
+            _show(one, verbose=verbose)
+    if as_json:
+        print_json(found if len(found) > 1 else found[0])
+    elif preview:
+        print_pair("preview", preview)
+
+
+def _show(found: Measurement, *, verbose: bool) -> None:
+    for notice in found.notices:
+        note(f"{found.mesh.name}: {notice}")
+    out.print(f"{found.mesh.name}: {found.verdict}", style="bold")
+    for name in found.metrics if verbose else FEW:
+        value = found.metrics[name]
+        text = "-" if value is None else f"{value:,.4g}" if value % 1 else f"{value:,.0f}"
+        out.print(f"{FEW.get(name, name):<45} {text}")
+    for place in found.worst:
+        where = ", ".join(f"{x:.4g}" for x in place.position)
+        out.print(
+            f"worst: triangle {place.triangle} (island {place.island}) at ({where}): "
+            f"dilatation {place.dilatation:.3g}, angles off by up to {place.angle_error_deg:.1f}",
+            soft_wrap=True,
+        )
