@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -34,8 +35,6 @@ from cembench.mesh.seams import are_copies, coincident_vertices, tolerances_of_g
 from cembench.mesh.side_lengths import loop_width, side_lengths
 from cembench.mesh.t_junctions import split_t_junctions
 
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Components = Literal["largest", "all"]
 
 #: A degenerate triangle with an edge below this share of its longest one is collapsed.

@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.mesh.defects import LARGEST_LENGTH, representatives
 from cembench.mesh.gluing import edges_of_half_edges
 from cembench.mesh.topology import boundary_loops
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Boundary vertices closer than this share of the largest coordinate coincide up to rounding:
 #: sin(2 pi) is not 0.
