@@ -92,7 +92,7 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         causes = causes or "the method, not the mesh"
     elif error > FAR_FROM_FREE * free:
         compared = f"but with a free boundary, as of {tried}, it is {free:.2g}"
-        causes = causes or "the surface is too long, or its mesh too coarse, for this domain"
+        causes = "the surface is too long, or its mesh too coarse, for this domain"
         advice = "--target plane, if the boundary may be free"
     else:
         others = {f"by {NEXT}": next_candidate(mesh), "with a free boundary (lscm)": free}
