@@ -57,6 +57,7 @@ CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 QUICK = 50_000
 #: The candidate of best that is run to compare with, on disks of at most so many triangles.
 NEXT, QUICK_RUN = "cetm-flips", 10_000
+TRY_BEST = "-a best, which tries several algorithms"
 #: Needles are named as a cause above this share of triangles with an angle below so many degrees.
 NEEDLES, THIN = 0.04, 5.0
 #: A note says what a repair of folds costs from so many degrees on.
@@ -85,9 +86,9 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         return notes
     causes, advice = "; ".join(likely_causes(mesh, uv, extras)), ""
     if error > FAR * reachable:
-        rival, by = next_candidate(mesh), f"by {NEXT}"
+        rival, by, advice = next_candidate(mesh), f"by {NEXT}", TRY_BEST
         if rival >= error:
-            rival, by = reachable, "with its boundary by harmonic measure"
+            rival, by, advice = reachable, "with its boundary by harmonic measure", ""
         compared = f"but it can be {rival:.2f} {by}"
         causes = causes or "the method, not the mesh"
     elif error > FAR_FROM_FREE * free:
@@ -111,12 +112,11 @@ def _better(target: str, figures: MapFigures) -> str:
     mesh = figures.mesh
     if target != "disk" or not isinstance(mesh, DiskMesh):
         return "-a best-holes, or --target plane"
-    advice = "-a best, which tries several algorithms"
     if mesh.m > QUICK:
-        return advice
+        return TRY_BEST
     uv, steps = evened(mesh, angle_gauge(mesh, figures.uv), 1)
     better = float(figures.angle_errors_of(uv).mean())
-    return f"{advice}: its first step brings this map to {better:.2f}" if steps else advice
+    return f"{TRY_BEST}: its first step brings this map to {better:.2f}" if steps else TRY_BEST
 
 
 def next_candidate(mesh: TriangleMesh) -> float:
