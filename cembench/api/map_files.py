@@ -106,7 +106,8 @@ def map_files(
     target : {"plane", "disk", "circular holes"}, optional
         Take the recommended map to the plane, with a free boundary and the least angle errors, to
         the disk, with round holes if there are any, or to the disk with round holes alone (default:
-        plane; disk with `certificate`, `geometry_image` or `remesh`, which need one).
+        plane; disk with `certificate`, `geometry_image`, `remesh` or `uv="square"`, which need
+        one).
     parameters : mapping, optional
         Parameters of the algorithm.
     output : path, optional
@@ -217,7 +218,8 @@ def map_files(
     options = Options(timeout=timeout, memory_bytes=bytes_of(memory_bytes))
     settings = MeasurementSettings(solves, installed_backend(backend), threads, repeats=1)
     registry = registry_with(plugins, reporter)
-    if algorithm is None and target is None and (certificate or geometry_image or remesh):
+    needs_disk = certificate or geometry_image or remesh or uv == "square"
+    if algorithm is None and target is None and needs_disk:
         target = "disk"
     candidates = [registry.algorithm(name) for name in algorithms_named(algorithm, target)]
     apart = timeout != Options.timeout or memory_bytes is not None

@@ -87,7 +87,7 @@ def repair(
     Steps, in order: faces with missing vertices dropped, polygons cut into triangles, coincident
     vertices welded, degenerate and duplicate triangles fixed or dropped, sides divided at vertices
     that lie on them, non-manifold edges and vertices split, triangles oriented consistently,
-    components chosen, ears of holes dropped, holes filled, isolated vertices removed.
+    components chosen, ears dropped, holes filled, isolated vertices removed.
     docs/repair.md describes each step.
 
     A repair that would lose a piece, or more than 1 % of the area, fails, and names the option that

@@ -14,14 +14,14 @@ from cembench.conformal.atlas import cut_map
 from cembench.conformal.laplacian import double_areas
 from cembench.conformal.planar import orientations, signed_areas
 from cembench.conformal.resample import disk_to_square
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.core.wording import Advice
 from cembench.mesh.files import SINGLE, write_soup
 from cembench.mesh.formats import gltf, obj
-from cembench.mesh.soup import Indices, Soup, Texture, columns
+from cembench.mesh.soup import Soup, Texture, columns
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.unit_square import packed, to_unit_square
 from cembench.mesh.uvs import uv_of_faces

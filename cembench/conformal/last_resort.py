@@ -31,14 +31,13 @@ from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
 from cembench.conformal.untangling import untangled
+from cembench.core.arrays import Complex, Mask
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import DiskMesh
 
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 DiskAlgorithm = Callable[..., Parameterization]
 
 #: Shortest arc, in radians, between the corners of a triangle that doubles resolve.
@@ -55,6 +54,8 @@ MEANS_RINGS, MEANS_ROUNDS = (1, 2, 4), 5
 ENOUGH, GOOD = 1.0, 10.0
 #: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
 MOST_TRIANGLES = 20_000
+#: Newton steps for that. It starts at a valid map, from where two are enough if it succeeds.
+LAYOUT_STEPS = 8
 #: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
 #: everywhere.
 BAD = 30.0
@@ -280,7 +281,8 @@ def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
         choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
     if not choice.cost[0] and mesh.m <= MOST_TRIANGLES:
         inside = ~_rings(graph, mesh.boundary, 0)
-        choice.offer(untangled(mesh, choice.z, inside, graph)[0], choice.by_means)
+        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS)
+        choice.offer(laid_out, choice.by_means)
 
 
 def _offer_mean_value_maps(choice: _Choice, own: Complex | None) -> None:

@@ -43,7 +43,11 @@ REGULAR = 1e-10
 
 
 def untangled(
-    mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: scipy.sparse.csr_array
+    mesh: TriangleMesh,
+    z: Complex,
+    free: NDArray[np.bool_],
+    graph: scipy.sparse.csr_array,
+    steps: int = STEPS,
 ) -> tuple[Complex, Indices]:
     """Lay out the free vertices of a planar map without folds, if possible.
 
@@ -58,6 +62,8 @@ def untangled(
         independent.
     graph : sparse (n, n)
         Which vertices share an edge.
+    steps : int
+        Maximal number of Newton steps.
 
     Returns
     -------
@@ -70,7 +76,7 @@ def untangled(
     patches = _Patches(mesh, z, free, graph)
     moving = z[patches.vertices]
     eps = np.full(patches.count, FIRST)
-    for _ in range(STEPS):
+    for _ in range(steps):
         depth = np.maximum(-patches.least(moving), 0)
         eps = np.maximum(DECAY * eps, np.hypot(LAST, DEPTH * depth))
         try:

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
+#: Coordinates, a row for each vertex.
+Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 #: Rows of pixels, with channels.

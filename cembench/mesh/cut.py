@@ -28,6 +28,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
@@ -36,8 +37,6 @@ from cembench.mesh.defects import UnusableMeshError, components
 from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Edge = tuple[int, int]
 
 #: An arc is replaced if that shortens it by more than this share.

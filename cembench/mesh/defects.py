@@ -16,16 +16,13 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arrays import Indices, Mask, Points
 from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.core.wording import Advice, Setting
 from cembench.mesh import topology
 from cembench.mesh.gluing import vertices_of_several_fans
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Mask = NDArray[np.bool_]
 
 #: A triangle is degenerate if its area is below this share of its longest edge squared.
 DEGENERATE_AREA = 1e-15

@@ -21,6 +21,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cembench.core.arrays import Complex
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra
@@ -31,7 +32,7 @@ from cembench.mesh.defects import array_of, check_finite, located, representativ
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
 from cembench.mesh.formats.apart import apart
 from cembench.mesh.repair import Repaired, repair
-from cembench.mesh.soup import Complex, Soup, Texture, complex_of
+from cembench.mesh.soup import Soup, Texture, complex_of
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
 M = TypeVar("M", bound=TriangleMesh)

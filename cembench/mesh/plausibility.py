@@ -5,17 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.core.errors import CembenchError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import LARGEST_LENGTH
 from cembench.mesh.gluing import edges_of_half_edges
 from cembench.mesh.repair import repair
 from cembench.mesh.seams import shortest_at_vertices, tolerances_of_gaps
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: Coordinates are coarse if their steps are above this share of the median edge.
 _COARSE = 0.05

@@ -12,10 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices
+from cembench.core.arrays import Indices, Points
 from cembench.core.blocks import blocks
-
-Points = NDArray[np.float64]
 
 #: A triangle is flat if its area is below this share of its polygon's; single precision leaves less
 #: of a corner on a straight side.

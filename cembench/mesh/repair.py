@@ -14,6 +14,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -34,14 +35,18 @@ from cembench.mesh.seams import are_copies, coincident_vertices, tolerances_of_g
 from cembench.mesh.side_lengths import loop_width, side_lengths
 from cembench.mesh.t_junctions import split_t_junctions
 
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 Components = Literal["largest", "all"]
 
 #: A degenerate triangle with an edge below this share of its longest one is collapsed.
 _NEEDLE = 1e-6
 #: A repair may lose this share of the area without being asked.
 _SMALL = 0.01
+#: A note says how much is kept of the area if it is less than this share.
+_TOLD = 0.9999
+#: A boundary is ragged if its ears are more than this share of its sides. A rectangular grid whose
+#: corners have less than :data:`_SMALL` of its area is not: k by l cells have at most 4 ears, on
+#: 2 (k + l) sides, and k l > 200.
+_RAGGED = 1 / 12
 #: Rounds of flips: flipping a degenerate triangle can make its neighbour degenerate.
 _FLIP_ROUNDS = 10
 
@@ -128,7 +133,7 @@ class Repaired:
     def notices(self) -> tuple[Notice, ...]:
         """One notice for each step that changed something, and what is kept if not all is."""
         texts = [f"{n:,} {TITLES[step]}" for step, n in self.steps.items() if n]
-        if not self.kept.is_whole:
+        if self.kept.area < _TOLD or not self.kept.is_whole:
             texts.append(f"{self.kept} are kept")
         return tuple(Notice(NoticeKind.REPAIRED, f"repaired: {text}") for text in texts)
 
@@ -604,30 +609,30 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
 
 
 def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.bool_]:
-    """Whether each triangle stays when those with two sides on a hole are dropped.
+    """Whether each triangle stays when ears, with two sides on the boundary, are dropped.
 
-    In a map to a disk with round holes they fold. None is dropped on the outer boundary, the widest
-    loop, or where they have more than :data:`_SMALL` of the area.
+    Those of holes fold in a map to a disk with round holes. Those of the outer boundary, the widest
+    loop, stay unless it is ragged. None is dropped where they have more than :data:`_SMALL` of the
+    area.
     """
+    loops, areas = topology.boundary_loops(F, len(V)), _areas(V, F)
+    widest = max(loops, key=lambda loop: loop_width(V[loop]), default=np.zeros(0, np.int64))
+    stays = np.asarray(np.isin(F, widest).any(axis=1))
+    if (_ears(F) & stays).sum() > _RAGGED * len(widest):
+        stays[:] = False
     keep = np.ones(len(F), dtype=bool)
-    if len(loops := topology.boundary_loops(F, len(V))) < 2:
-        return keep
-    outer = np.zeros(len(V), dtype=bool)
-    outer[max(loops, key=lambda loop: loop_width(V[loop]))] = True
-    while True:
-        left = F[keep]
-        _, edge, faces = edges_of_half_edges(left)
-        open_ = (faces[edge] == 1).reshape(-1, 3)
-        ends = open_ | np.roll(open_, 1, axis=1)
-        ears = (open_.sum(axis=1) >= 2) & ~(outer[left] & ends).any(axis=1)
-        if not ears.any():
-            break
+    while (ears := _ears(F[keep]) & ~stays[keep]).any():
         keep[np.flatnonzero(keep)[ears]] = False
-    areas = _areas(V, F)
     if areas[~keep].sum() > _SMALL * areas.sum():
         return np.ones(len(F), dtype=bool)
     steps[Step.ears] += int((~keep).sum())
     return keep
+
+
+def _ears(F: Indices) -> NDArray[np.bool_]:
+    """Whether each triangle has two sides or three on the boundary."""
+    _, edge, faces = edges_of_half_edges(F)
+    return np.asarray((faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2)
 
 
 def _fill_holes(V: Points, F: Indices, most: int, steps: dict[Step, int]) -> tuple[Points, Indices]:

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.mesh.defects import LARGEST_LENGTH, representatives
 from cembench.mesh.gluing import edges_of_half_edges
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
+from cembench.mesh.topology import boundary_loops
 
 #: Boundary vertices closer than this share of the largest coordinate coincide up to rounding:
 #: sin(2 pi) is not 0.
@@ -64,9 +62,10 @@ def are_copies(F: Indices, first: Indices) -> bool:
     -------
     bool
         True where many vertices at one position or at two are joined by edges or have one triangle
-        each, as at the poles of a grid; where copies follow their originals at few regular
-        distances, as on the sides of a grid; and where the last vertices are copies of the first,
-        as of its first row. A cut adds its copies at the end, in the order of its curve.
+        each, as at the poles of a grid; where all boundaries are slits, more than one, of a surface
+        that is closed otherwise, as decimation leaves them; where copies follow their originals at
+        few regular distances, as on the sides of a grid; and where the last vertices are copies of
+        the first, as of its first row. A cut adds its copies at the end, in the order of its curve.
 
     """
     at, counts = first[F], np.bincount(first)
@@ -74,6 +73,8 @@ def are_copies(F: Indices, first: Indices) -> bool:
     joined[at[at == np.roll(at, 1, axis=1)]] = True
     lone = np.bincount(first, np.bincount(F.ravel(), minlength=len(first)) == 1) == counts
     if 1 <= np.count_nonzero((joined | lone) & (counts >= _POLE)) <= 2:
+        return True
+    if not len(boundary_vertices(at)) and len(boundary_loops(F, len(first))) > 1:
         return True
     copies = np.flatnonzero(first != np.arange(len(first)))
     if copies[-1] - copies[0] == len(copies) - 1 and copies[-1] == len(first) - 1:

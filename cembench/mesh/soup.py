@@ -17,13 +17,10 @@ from typing import Any, Self, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arrays import Complex, Indices, Points
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.polygons import triangulate
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
-Complex = NDArray[np.complex128]
 
 #: Marks a corner without texture coordinates.
 NO_UV = -1

@@ -9,13 +9,10 @@ from collections import Counter
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Points
 from cembench.mesh.gluing import edges_of_half_edges
 from cembench.mesh.polygons import triangulate
-
-Points = NDArray[np.float64]
-Indices = NDArray[np.int64]
 
 #: A vertex is on a side within this share of its length; files of six digits are accepted.
 _ON_SIDE = 1e-5

@@ -7,10 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from cembench.core.arrays import Points
 from cembench.core.errors import MeshError
 from cembench.mesh.soup import Soup
-
-Points = NDArray[np.float64]
 
 
 def heights_of(surface: Any) -> tuple[Points, Points, Points] | None:

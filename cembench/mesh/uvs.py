@@ -11,20 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cembench.core.arrays import Complex, Indices, Points
 from cembench.core.errors import MeshError, describe_error
 from cembench.mesh.files import read_soup
 from cembench.mesh.formats import mat, npz, obj, off, ply
-from cembench.mesh.soup import (
-    NO_UV,
-    Complex,
-    Indices,
-    Points,
-    Soup,
-    columns,
-    complex_of,
-    damaged,
-    shown,
-)
+from cembench.mesh.soup import NO_UV, Soup, columns, complex_of, damaged, shown
 
 #: Allowed distance of a vertex from its original position, relative to the surface's extent: single
 #: precision and six decimals are accepted.

@@ -38,6 +38,7 @@ from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.cut import cut_open
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh, definition_1_notices
+from cembench.registry import load_registry
 
 #: A map with a mean angle error above this multiple of the yardstick's is far from conformal.
 FAR = 2.0
@@ -54,8 +55,13 @@ COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
 #: A step of best is tried on surfaces of at most so many triangles.
 QUICK = 50_000
+#: The candidate of best that is run to compare with, on disks of at most so many triangles.
+NEXT, QUICK_RUN = "cetm-flips", 10_000
+TRY_BEST = "-a best, which tries several algorithms"
 #: Needles are named as a cause above this share of triangles with an angle below so many degrees.
 NEEDLES, THIN = 0.04, 5.0
+#: A note says what a repair of folds costs from so many degrees on.
+COSTLY = 1.0
 #: Other parameters are better if the mean angle error with them is below this share.
 BETTER = 0.9
 
@@ -80,15 +86,18 @@ def quality_notes(target: str, figures: MapFigures, extras: Mapping[str, Any]) -
         return notes
     causes, advice = "; ".join(likely_causes(mesh, uv, extras)), ""
     if error > FAR * reachable:
-        compared = f"but with its boundary by harmonic measure it is {reachable:.2f}"
+        rival, by, advice = next_candidate(mesh), f"by {NEXT}", TRY_BEST
+        if rival >= error:
+            rival, by, advice = reachable, "with its boundary by harmonic measure", ""
+        compared = f"but it can be {rival:.2f} {by}"
         causes = causes or "the method, not the mesh"
     elif error > FAR_FROM_FREE * free:
         compared = f"but with a free boundary, as of {tried}, it is {free:.2g}"
-        causes = causes or "the surface is too long, or its mesh too coarse, for this domain"
+        causes = "the surface is too long, or its mesh too coarse, for this domain"
         advice = "--target plane, if the boundary may be free"
     else:
-        others = {"its boundary by harmonic measure": reachable, "a free boundary (lscm)": free}
-        named = [f"with {name} {one:.2f}" for name, one in others.items() if one < np.inf]
+        others = {f"by {NEXT}": next_candidate(mesh), "with a free boundary (lscm)": free}
+        named = [f"{name} {one:.2f}" for name, one in others.items() if one < np.inf]
         compared = "; ".join(named) or "and no other map was computed"
         causes = causes or "the mesh is too coarse"
     text = (
@@ -103,12 +112,22 @@ def _better(target: str, figures: MapFigures) -> str:
     mesh = figures.mesh
     if target != "disk" or not isinstance(mesh, DiskMesh):
         return "-a best-holes, or --target plane"
-    advice = "-a best, which tries several algorithms"
     if mesh.m > QUICK:
-        return advice
+        return TRY_BEST
     uv, steps = evened(mesh, angle_gauge(mesh, figures.uv), 1)
     better = float(figures.angle_errors_of(uv).mean())
-    return f"{advice}: its first step brings this map to {better:.2f}" if steps else advice
+    return f"{TRY_BEST}: its first step brings this map to {better:.2f}" if steps else TRY_BEST
+
+
+def next_candidate(mesh: TriangleMesh) -> float:
+    """Return the mean angle error of :data:`NEXT`; infinite where it is not run or not valid."""
+    if not isinstance(mesh, DiskMesh) or mesh.m > QUICK_RUN:
+        return np.inf
+    try:
+        uv = load_registry().algorithm(NEXT).function(mesh).uv
+    except AlgorithmFailed:
+        return np.inf
+    return np.inf if flipped_triangles(mesh, uv) else float(angle_errors(mesh, uv).mean())
 
 
 def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) -> list[Notice]:
@@ -119,13 +138,19 @@ def _last_resort(mesh: TriangleMesh, extras: Mapping[str, Any], error: float) ->
         chosen = extras["chosen"]
         message = f"{wanted} is not valid here, or worse ({causes}), so this is that of {chosen}"
         return [Notice(NoticeKind.LAST_RESORT, message)]
-    done = extras.get("last_resort")
-    if not done:
-        return []
+    done, before = extras.get("last_resort"), extras.get("before_repair", {})
     folded, failure = extras.get("folded_before_repair"), extras.get("failure")
     own = f"failed ({failure})" if failure else f"has {folded:,} folds" if folded else "is crowded"
-    before = extras.get("before_repair", {}).get("angle_error_mean_deg")
-    cost = "" if before is None else f" instead of {before:.2f}"
+    without = before.get("angle_error_mean_deg")
+    cost = "" if without is None else f" instead of {without:.2f}"
+    if not done and (without is None or error < without + COSTLY):
+        return []
+    if not done:
+        message = (
+            f"the method's own map {own}, and their repair costs {error - without:.2f} degrees: "
+            f"the mean angle error is {error:.2f}{cost}"
+        )
+        return [Notice(NoticeKind.LAST_RESORT, message)]
     if "opened_holes" in done:
         crosses = f"has {folded:,} folds" if folded else "has boundaries that cross"
         message = (

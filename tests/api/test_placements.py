@@ -99,6 +99,14 @@ def test_only_a_disk_fills_the_square(cap, tmp_path, cli):
     assert not (tmp_path / "c.obj").exists()
 
 
+def test_a_square_takes_the_disk_by_itself(cap, tmp_path):
+    write_mesh(tmp_path / "a.obj", cap)
+    output = tmp_path / "b.obj"
+    (mapped,) = cembench.map_files(tmp_path / "a.obj", output=output, uv="square")
+    assert mapped.record.cell.algorithm == "direct-cem"
+    assert area_of(uv_of(output)) == pytest.approx(1, abs=0.02)
+
+
 def test_a_flat_mesh_of_a_cut_surface_has_the_disk_s_vertices(tmp_path):
     (tmp_path / "torus.obj").write_text(gallery.obj_text(*gallery.torus()))
     (mapped,) = cembench.map_files(

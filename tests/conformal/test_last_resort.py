@@ -14,9 +14,11 @@ from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import LEAST_ARC, valid_map
 from cembench.conformal.metrics import MapFigures, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
+from cembench.conformal.untangling import _Patches, untangled
 from cembench.core.notices import NoticeKind
 from cembench.running.quality import quality_notes
 from tests import gallery
+from tests.campaign.hard_meshes import pinched_boundary
 
 TOOLS = [direct_cem, bff, cetm_flips]
 
@@ -109,3 +111,18 @@ def test_the_paper_s_algorithms_have_it_on_request_only():
     assert is_valid(mesh, cem(mesh, last_resort=True).uv)
     with pytest.raises(AlgorithmFailed):
         cem(mesh, last_resort=True, repair=False)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_whole_interior_is_laid_out_in_few_steps_or_not_at_all(seed, monkeypatch):
+    mesh = DiskMesh.from_arrays(*pinched_boundary(np.random.default_rng(seed)))
+    steps, step = [], _Patches.newton_step
+
+    def counted(*arguments):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(_Patches, "newton_step", lambda *k: steps.append(k) or step(*k))
+            return untangled(*arguments)
+
+    monkeypatch.setattr("cembench.conformal.last_resort.untangled", counted)
+    assert is_valid(mesh, direct_cem(mesh).uv)
+    assert len(steps) <= 8

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +14,9 @@ from cembench.surfaces.flat_disk import flat_disk
 from scipy.io import savemat
 
 from cembench.core.errors import MeshError
-from cembench.core.extras import MissingExtra
+from cembench.core.extras import Extra, MissingExtra
 from cembench.core.notices import NoticeKind
+from cembench.mesh import files
 from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.formats import apart
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -169,7 +171,8 @@ def test_gifti(disk, tmp_path):
 def forked_readers(monkeypatch):
     """Libraries read in forks of this process: twenty-five interpreters would load them anew."""
 
-    def run(command, check, **streams):
+    def run(command, check, timeout, **streams):
+        assert timeout > 60
         assert set(streams.values()) == {subprocess.DEVNULL}
         assert command[:4] == [sys.executable, "-P", "-m", apart.__name__]
         with Path(os.devnull).open("r+b") as nowhere:
@@ -218,3 +221,15 @@ def test_a_missing_library_is_named_with_its_extra(monkeypatch, tmp_path, suffix
     (tmp_path / f"a{suffix}").write_bytes(b"x")
     with pytest.raises(MissingExtra, match=rf"{module}.*cembench\[{extra}\]"):
         read_mesh(tmp_path / f"a{suffix}")
+
+
+def test_a_library_that_never_ends_is_stopped(tmp_path, monkeypatch):
+    (tmp_path / "endless.py").write_text("def read(path):\n    while True:\n        pass\n")
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(apart, "_SECONDS", 2.0)
+    reader = apart.apart(import_module("endless").read, Extra.FORMATS, "numpy")
+    monkeypatch.setitem(files.READERS, ".vtk", reader)
+    (tmp_path / "a.vtk").write_bytes(b"# vtk DataFile Version 3.0")
+    with pytest.raises(MeshError, match=r"a\.vtk: numpy did not finish .* 2 seconds.*export"):
+        read_soup(tmp_path / "a.vtk")

@@ -138,6 +138,24 @@ def test_the_corners_of_a_grid_stay():
     assert len(repaired.surfaces[0][1]) == len(F)
 
 
+@pytest.mark.parametrize("rows", [120, 160])
+def test_the_ears_of_a_ragged_boundary_go(rows):
+    V, F = gallery.flat_rectangle(rows, rows)
+    x, y, _ = np.floor(V[F].mean(axis=1)).T
+    teeth = F[(y < rows - 1) | (x % 2 == 0)]  # in the last row, with two triangles each
+    repaired = repair(V, teeth)
+    left = repaired.surfaces[0][1]
+    assert len(teeth) - len(left) == repaired.steps[Step.ears] >= rows
+    assert f"{100 * len(left) / len(teeth):.4g} % of the area" in repaired.notices[-1].text
+
+
+@pytest.mark.parametrize("columns", [14, 40, 200])
+def test_no_rectangle_loses_its_corners(columns):
+    for rows in (1, 2, 5, 14):
+        V, F = gallery.flat_rectangle(rows, columns)
+        assert not steps_taken(repair(V, F))
+
+
 def test_small_holes_are_filled_and_the_longest_loop_stays():
     V, F = gallery.flat_rectangle(9, 9)
     fan = np.flatnonzero((F == 44).any(axis=1))

@@ -9,6 +9,7 @@ from cembench.mesh import topology
 from cembench.mesh.cut import cut_open
 from cembench.mesh.defects import Defect, RepairLossError, UnusableMeshError
 from cembench.mesh.files import read_soup, repair_soup, write_mesh
+from cembench.mesh.gluing import edges_of_half_edges, glue, paired_half_edges
 from cembench.mesh.repair import Step, repair
 from cembench.mesh.soup import Soup
 from tests import gallery
@@ -101,6 +102,21 @@ def test_a_slit_in_a_plate_stays_open():
     V = np.vstack([V, V[slit[1:-1]]])
     assert len(HoledMesh.from_arrays(V, F).loops) == 2
     assert steps_taken(repair(V, F)) == {Step.kept_open: 3}
+
+
+@pytest.mark.parametrize("slits", [1, 2, 9])
+def test_several_slits_of_a_closed_surface_are_closed_and_a_single_one_stays(slits):
+    V, F = repair(*grid_of(sphere, 12, 20)).surfaces[0]
+    edges, edge, faces = edges_of_half_edges(F)
+    pairs = paired_half_edges(edge, faces)
+    middles = {60 + 19 * k for k in range(slits)}
+    along = (np.diff(edges, axis=1)[:, 0] == 1) & (np.isin(edges, list(middles)).any(axis=1))
+    G, origin = glue(F, pairs[~along[edge[pairs[:, 0]]]], len(V))
+    assert len(topology.boundary_loops(G, len(origin))) == slits
+    repaired = repair(V[origin], G)
+    found = len(topology.boundary_loops(repaired.surfaces[0][1], len(repaired.surfaces[0][0])))
+    assert found == (1 if slits == 1 else 0)
+    assert repaired.kept.area == pytest.approx(1)
 
 
 def test_vertices_with_a_texture_coordinate_each_are_copies(tmp_path):

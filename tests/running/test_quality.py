@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
+from cembench.algorithms.cetm.flips import cetm_flips
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.algorithms.direct_cem.holes import direct_cem_holes
 from cembench.algorithms.harmonic_circle import harmonic_circle
@@ -82,6 +83,22 @@ def test_a_map_by_arc_length_of_a_long_surface_is_far_from_conformal():
     (note,) = notes_on("disk", mesh, harmonic_circle(mesh).uv, {})
     assert note.kind is NoticeKind.FAR_FROM_CONFORMAL
     assert "the method, not the mesh" in note.text
+    rival = angle_errors(mesh, cetm_flips(mesh).uv).mean()
+    assert f"but it can be {rival:.2f} by cetm-flips" in note.text
+    assert note.text.endswith("Take -a best, which tries several algorithms")
+
+
+def test_a_repair_of_folds_that_costs_more_than_a_degree_is_told():
+    mesh = flat_disk(200, stretch=1.2)
+    uv = direct_cem(flat_disk(200)).uv
+    error = angle_errors(mesh, uv).mean()
+    for cost, count in ((0.9, 0), (1.1, 1)):
+        before = {"angle_error_mean_deg": error - cost}
+        extras = {"fold_repairs": 2, "folded_before_repair": 7, "before_repair": before}
+        notes = notes_on("disk", mesh, uv, extras)
+        assert len(of_kind(NoticeKind.LAST_RESORT, notes)) == count
+    assert "7 folds, and their repair costs 1.10 degrees" in notes[0].text
+    assert f"{error:.2f} instead of {error - 1.1:.2f}" in notes[0].text
 
 
 def test_with_holes_the_yardstick_has_the_same_boundary_outside():
@@ -155,8 +172,9 @@ def test_a_map_that_is_nearly_collapsed_is_told_even_where_the_yardstick_is_no_b
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: flat)
     monkeypatch.setattr("cembench.running.quality.free_map", lambda _: (np.inf, ""))
     (note,) = notes_on("disk", mesh, flat, {})
-    assert "with its boundary by harmonic measure" in note.text
+    assert "degrees, by cetm-flips" in note.text
     assert "too coarse" in note.text
+    monkeypatch.setattr("cembench.running.quality.next_candidate", lambda _: np.inf)
     monkeypatch.setattr("cembench.running.quality.yardstick", lambda *_: None)
     (note,) = notes_on("disk", mesh, flat, {})
     assert "and no other map was computed" in note.text
@@ -172,6 +190,7 @@ def test_a_surface_too_long_for_a_disk_is_told_by_its_free_boundary(algorithm):
     assert result.metrics["angle_error_mean_deg"] > POOR
     notes = of_kind(NoticeKind.FAR_FROM_CONFORMAL, result.outcome.notes)
     assert len(notes) == 1
+    assert "cause: the surface is too long" in notes[0].text  # not its ears, which lscm has, too
     assert not cembench.parameterize(mesh, algorithm, check="fast").outcome.notes
 
 

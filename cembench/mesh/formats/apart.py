@@ -1,7 +1,8 @@
-"""Read a file by a library, in a process of its own whose memory is bounded.
+"""Read a file by a library, in a process of its own whose memory and time are bounded.
 
 A small file can declare, or unpack to, more than memory holds. Our own readers compare sizes first;
 libraries do not, and those in C++ end the process when memory runs out. That process is not ours.
+On some damaged files a library never ends.
 """
 
 from __future__ import annotations
@@ -33,6 +34,8 @@ Reader = Callable[[Path], Soup]
 _SOUP, _ERROR = "soup.npz", "error.txt"
 #: Exit code of a process in which a reader ran out of memory.
 _NO_MEMORY = 12
+#: Seconds that a library has for any file, and more for each megabyte: a hundred times the usual.
+_SECONDS, _SECONDS_PER_MB = 120.0, 10.0
 
 
 def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
@@ -49,7 +52,14 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
             reads = [reader.__module__, reader.__name__, str(path.absolute()), name]
             command = [sys.executable, "-P", "-m", __name__, *reads]
             nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
-            ended = subprocess.run(command, check=False, **nowhere)
+            most = _SECONDS + _SECONDS_PER_MB * path.stat().st_size / 1e6
+            try:
+                ended = subprocess.run(command, check=False, timeout=most, **nowhere)
+            except subprocess.TimeoutExpired:
+                raise damaged(
+                    f"{module} did not finish reading it in {most:.0f} seconds, many times what a "
+                    "file of this size takes, and was stopped"
+                ) from None
             if (folder / _ERROR).exists():
                 raise MeshError((folder / _ERROR).read_text(encoding="utf-8"))
             if ended.returncode == 0:

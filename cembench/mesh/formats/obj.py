@@ -18,12 +18,11 @@ from pathlib import Path
 
 import numpy as np
 
+from cembench.core.arrays import Complex, Indices
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import (
     BYTE_ORDER_MARK,
     NO_UV,
-    Complex,
-    Indices,
     Soup,
     complex_of,
     numbers_of,
