@@ -19,9 +19,8 @@ from cembench.conformal.metrics import (
 )
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import texel_density_ratio
+from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import DiskMesh
-
-Complex = NDArray[np.complex128]
 
 #: The search begins with moves of the disk's centre by this hyperbolic length ...
 FIRST_MOVE = 0.3

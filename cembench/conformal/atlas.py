@@ -13,14 +13,11 @@ from functools import cached_property
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.metrics import METRICS, MapFigures, Metric, computed
 from cembench.conformal.planar import folded_triangles, signed_areas
+from cembench.core.arrays import Complex, Indices
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 #: Metrics that do not apply to an atlas, whose outline is not meant to be round.
 _NOT_OF_AN_ATLAS = ("boundary_circularity", "common_gauge_energy", "overlap_share")

@@ -27,11 +27,9 @@ from numpy.typing import NDArray
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.trust_region import newton_step
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Fourier modes from 2 to this one have the Hessian's own weight in the preconditioner.
 MODES = 8

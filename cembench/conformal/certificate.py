@@ -21,10 +21,9 @@ from cembench.conformal.conjugate_functions import conjugate_functions
 from cembench.conformal.harmonic import edge_lengths, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import fitted_circle, polygon_area
+from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-
-Complex = NDArray[np.complex128]
 
 #: Positions of the four points along the boundary. On a symmetric surface quarters would be
 #: symmetric under every map, and could not distinguish maps.

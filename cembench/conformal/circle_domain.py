@@ -15,10 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.moebius import Moebius
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
+from cembench.core.arrays import Complex, Indices, Real
 
 #: Minimal share of its initial length that every arc keeps, so that no vertices meet.
 LEAST_SHARE = 0.1

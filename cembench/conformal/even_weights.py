@@ -17,18 +17,15 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import corner_products
 from cembench.conformal.metrics import angle_errors, flipped_triangles
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: A step counts if it lowers the mean angle error by this share.
 LEAST_GAIN = 1e-3

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.metrics import corner_angles
 from cembench.conformal.planar import polygon_area
+from cembench.core.arrays import Complex, Indices
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -19,9 +19,6 @@ from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.gluing import twins_of_half_edges
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
-
-Complex = NDArray[np.complex128]
-Indices = NDArray[np.int64]
 
 
 def conformal_energy_form(L: scipy.sparse.csc_array, *loops: Indices) -> scipy.sparse.csc_array:

@@ -31,14 +31,13 @@ from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
 from cembench.conformal.untangling import untangled
+from cembench.core.arrays import Complex, Mask
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import DiskMesh
 
-Complex = NDArray[np.complex128]
-Mask = NDArray[np.bool_]
 DiskAlgorithm = Callable[..., Parameterization]
 
 #: Shortest arc, in radians, between the corners of a triangle that doubles resolve.

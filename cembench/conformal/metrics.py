@@ -31,13 +31,11 @@ from cembench.conformal.texel_density import (
     texture_words,
     undersampled_share,
 )
+from cembench.core.arrays import Complex, Real
 from cembench.core.blocks import blocks, in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 #: Share of E_D by which rounding may make E_C negative.
 LEAST_ENERGY = 1e-9

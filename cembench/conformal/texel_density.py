@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from cembench.core.arrays import Complex, Real
 
 #: Share of the surface at either end that the ratio of densities leaves out.
 TAIL = 0.01

@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Indices = NDArray[np.int64]
+#: Vertices of a boundary loop, in order.
+Loop = Indices
 Mask = NDArray[np.bool_]
 #: Rows of pixels, with channels.
 Picture = NDArray[np.uint8]
