@@ -26,10 +26,11 @@ from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.columns import row
 from cembench.results.comparison import NOT_DETECTED
+from cembench.results.intervals import Interval
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
+from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -180,8 +181,9 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
             ("seconds", against.speed),
         ):
             if pairs is not None:
-                ends = (pairs.ratio, pairs.low, pairs.high)
-                rows.append([f"{name} / {against.title}", *_counts(pairs), *ends])
+                counts = [getattr(pairs, side, None) for side in ("lower", "equal", "higher")]
+                ratio = (pairs.ratio, *_ends(pairs.interval))
+                rows.append([f"{name} / {against.title}", *counts, *ratio])
     whole = "of the rounds, not of the surfaces"
     timed = any(against.speed is not None for against in compared)
     return Table.of(
@@ -200,10 +202,8 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     )
 
 
-def _counts(compared: PairedComparison | Speed) -> tuple[int | None, ...]:
-    if isinstance(compared, Speed):
-        return (None, None, None)
-    return (compared.lower, compared.equal, compared.higher)
+def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    return (interval.low, interval.high) if interval else (None, None)
 
 
 def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
@@ -252,7 +252,7 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     yield measured(pair.baseline_seconds, ".4f", theirs)
     if program:
         yield from (measured(s, ".4f") for s in (pair.start_seconds, pair.solve_seconds))
-    yield ratio(pair.seconds_ratio)
+    yield ratio(pair.speed.ratio if pair.speed else None)
 
 
 def quotient(ours: float | None, theirs: float | None) -> float | None:
@@ -267,7 +267,7 @@ def _growth_table(compared: GrowthComparison) -> Table:
     for growth in growths:
         at = dict(zip(growth.faces, growth.seconds, strict=True))
         cells = [entry(at.get(f), ".4f", "not timed", origin="surface") for f in sizes]
-        rows.append([growth.what, *cells, growth.exponent, growth.low, growth.high])
+        rows.append([growth.what, *cells, growth.exponent, *_ends(growth.interval)])
     return Table.of(
         "growth",
         "Seconds by number of triangles",
