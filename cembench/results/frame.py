@@ -112,12 +112,15 @@ def _wins(of: pd.Series, families: pd.Series) -> tuple[int, int]:
     return votes([1.0] * len(of), list(of), list(families))
 
 
-def _family_geometric(of: pd.Series, families: pd.Series) -> float:
-    return exp(mean(family_means(list(map(log, of)), list(families))))
+def _family_geometric(of: pd.Series, families: pd.Series) -> float | None:
+    known = of.dropna()
+    means = family_means(list(map(log, known)), list(families[known.index]))
+    return exp(mean(means)) if means else None
 
 
 def _family_interval(of: pd.Series, families: pd.Series) -> str | None:
-    interval = average_interval(list(of), list(families))
+    known = of.dropna()
+    interval = average_interval(list(known), list(families[known.index]))
     return f"{interval.low:.2f} to {interval.high:.2f}" if interval else None
 
 
