@@ -200,31 +200,21 @@ def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibi
         f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
         "those that can be mapped."
     )
-    tables = [
-        ExhibitTable(
-            title="Surfaces of this run",
-            columns=(
-                *("surface", "family", "vertices", "triangles", "boundaries", "from", "licence"),
-            ),
-            rows=tuple(
-                (
-                    *(
-                        one.name,
-                        collected.roles[one.name].family or one.name,
-                        one.mesh.n,
-                        one.mesh.m,
-                    ),
-                    *(len(one.mesh.loops), one.source, one.licence),
-                )
-                for one in collected.surfaces
-                if one.mesh is not None
-            ),
+    columns = ("surface", "family", "vertices", "triangles", "boundaries", "from", "licence")
+    roles = collected.roles
+    rows = tuple(
+        (
+            *(one.name, roles[one.name].family or one.name, one.mesh.n, one.mesh.m),
+            *(len(one.mesh.loops), one.source, one.licence),
         )
-    ]
+        for one in collected.surfaces
+        if one.mesh is not None
+    )
+    tables = [ExhibitTable(title="Surfaces of this run", columns=columns, rows=rows)]
     if collected.refused:
-        rows = tuple((one.name, one.error, one.source) for one in collected.refused)
-        columns = ("surface", "reason", "from")
-        tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
+        refused = tuple((one.name, one.error, one.source) for one in collected.refused)
+        why = ("surface", "reason", "from")
+        tables.append(ExhibitTable(title="Not measured", columns=why, rows=refused))
     return Exhibit(
         name=EXHIBIT,
         title="The surfaces",

@@ -23,6 +23,7 @@ from cembench.results.comparison import (
     reference_of,
     references,
     seconds_interval,
+    speedup_columns,
 )
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import REFERENCE, LinearAlgebraWork, Outcome, Record
@@ -426,19 +427,15 @@ def _compared(
     cpu: Comparison | None,
 ) -> dict[str, Any]:
     """Return the columns of the speedup of the reference and its verdicts."""
-    interval = found.speedup_interval if found else None
-    cpu_interval = cpu.interval if cpu else None
+    interval = cpu and cpu.interval
     return {
         "reference": reference.cell.algorithm if found and reference else None,
-        "speedup": found.speedup if found else None,
-        "speedup_low": interval.low if interval else None,
-        "speedup_high": interval.high if interval else None,
-        "verdict": found.verdict if found else None,
-        "verdict_corrected": together.verdict if together else None,
-        "p": together.p if together else None,
-        "cpu_ratio": cpu.ratio if cpu else None,
-        "cpu_ratio_low": cpu_interval.low if cpu_interval else None,
-        "cpu_ratio_high": cpu_interval.high if cpu_interval else None,
+        **speedup_columns(found),
+        "verdict_corrected": together and together.verdict,
+        "p": together and together.p,
+        "cpu_ratio": cpu and cpu.ratio,
+        "cpu_ratio_low": interval and interval.low,
+        "cpu_ratio_high": interval and interval.high,
     }
 
 

@@ -57,19 +57,21 @@ OF_MODELS, OF_ANY = "ok & main & chosen & model.notna()", "ok & main & chosen"
 Row = Mapping[str, float | None]
 
 
-class _Part(BaseModel):
+class Declaration(BaseModel):
+    """A part of a declaration, which has no other keys than its own."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     @model_validator(mode="before")
     @classmethod
     def _known(cls, given: Any) -> Any:
-        for name in given if isinstance(given, dict) else ():
+        for name in given if isinstance(given, Mapping) else ():
             if name not in cls.model_fields and cls.model_config["extra"] == "forbid":
                 raise ValueError(_unknown(name, cls.model_fields))
         return given
 
 
-class ProfileLimits(_Part):
+class ProfileLimits(Declaration):
     """The number of smallest models in `quick`, and the most triangles of one in `standard`.
 
     `budgets` are the seconds after which cells get no more rounds, by profile.
@@ -80,7 +82,7 @@ class ProfileLimits(_Part):
     budgets: Mapping[Profile, float] = {}
 
 
-class Picture(_Part):
+class Picture(Declaration):
     """A figure that shows one model with its map."""
 
     figure: str
@@ -88,7 +90,7 @@ class Picture(_Part):
     shows: tuple[Literal["checkerboard", "curvature", "mesh"], ...] = ("checkerboard",)
 
 
-class PlottedFigure(_Part):
+class PlottedFigure(Declaration):
     """A figure that a plot shows, with a panel for each model where it has any.
 
     Its other keys declare the plot (:mod:`cembench.report.declared_plots`).
@@ -99,7 +101,7 @@ class PlottedFigure(_Part):
     models: tuple[str, ...] = ()
 
 
-class ExpectedExhibit(_Part):
+class ExpectedExhibit(Declaration):
     """A figure that a command of cembench adds to a run, as an exhibit of this kind.
 
     With `models` it is one only for surfaces that are, or stand in for, these, in this order.
@@ -112,7 +114,7 @@ class ExpectedExhibit(_Part):
     models: tuple[str, ...] = ()
 
 
-class PrintedFigure(_Part):
+class PrintedFigure(Declaration):
     """A figure of each algorithm in a printed table.
 
     `column` names it in the frame of a run ("rate": the rate of speedup of the reference), and
@@ -129,7 +131,7 @@ class PrintedFigure(_Part):
     unit: Literal["s", "ms", "min"] = "s"
 
 
-class PrintedTable(_Part):
+class PrintedTable(Declaration):
     """A table that shows its printed figures beside measured ones."""
 
     title: str
@@ -144,7 +146,7 @@ class PrintedTable(_Part):
     sources: tuple[str, ...] = ()
 
 
-class Erratum(_Part):
+class Erratum(Declaration):
     """A printed cell that contradicts the rest of the paper."""
 
     table: int
@@ -153,7 +155,7 @@ class Erratum(_Part):
     reason: str
 
 
-class HowRun(_Part):
+class HowRun(Declaration):
     """A parameter with which the paper ran an algorithm on its own models, and elsewhere's value.
 
     Without `models` it is all of them.
@@ -166,7 +168,7 @@ class HowRun(_Part):
     models: tuple[str, ...] = ()
 
 
-class StatedClaim(_Part):
+class StatedClaim(Declaration):
     """A sentence of the paper with its test on a run.
 
     The test is made of expressions (:mod:`cembench.results.frame`), in which the numbers of the
@@ -226,7 +228,7 @@ class StatedClaim(_Part):
     remark: str = ""
 
 
-class Paper(_Part):
+class Paper(Declaration):
     """A paper: what it printed, how it ran its algorithms, and what it claims."""
 
     #: The folder, and the package that it is if it is installed.

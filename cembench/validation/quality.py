@@ -15,8 +15,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from itertools import starmap
-from math import exp, log
-from statistics import median
 
 from pydantic import BaseModel, ConfigDict
 
@@ -28,6 +26,7 @@ from cembench.results.comparison import (
     compare_ratios,
     confirmed,
     measured_ratios,
+    middle_ratio,
     paired_ratios,
 )
 from cembench.results.intervals import Interval, median_interval
@@ -183,7 +182,7 @@ def sides(ratios: Sequence[float]) -> PairedComparison:
         lower=sum(ratio < 1 - TIE for ratio in ratios),
         equal=sum(1 - TIE <= ratio <= 1 + TIE for ratio in ratios),
         higher=sum(ratio > 1 + TIE for ratio in ratios),
-        ratio=_median_ratio(ratios) if ratios else None,
+        ratio=middle_ratio(ratios) if ratios else None,
         interval=median_interval(ratios),
     )
 
@@ -200,7 +199,7 @@ def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Comparison | None:
 def _by_round(by_surface: Sequence[Sequence[float]]) -> list[float]:
     """Return the median ratio over the surfaces that have ratios, for each round."""
     known = [ratios for ratios in by_surface if ratios]
-    return [_median_ratio(ratios) for ratios in zip(*known, strict=False)]
+    return [middle_ratio(ratios) for ratios in zip(*known, strict=False)]
 
 
 def folds_on(records: Sequence[Record]) -> list[str]:
@@ -279,10 +278,6 @@ def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
     if energy is None or not area:
         return None
     return worse * (energy / area if relative else energy)
-
-
-def _median_ratio(ratios: Sequence[float]) -> float:
-    return exp(median(map(log, ratios)))
 
 
 def _only_folds(record: Record) -> bool:

@@ -20,7 +20,7 @@ from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
-from cembench.results.comparison import Comparison, compare, latest
+from cembench.results.comparison import Comparison, compare, latest, speedup_columns
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import NO_PAPER, Paper, paper_of, papers, usual_paper
@@ -485,13 +485,9 @@ class Evidence:
 
     def _compared(self, key: str) -> dict[str, Any]:
         comparison = self.comparisons.get(key)
-        interval = comparison and comparison.speedup_interval
         return {
             "comparison": comparison,
-            "speedup": comparison and comparison.speedup,
-            "speedup_low": interval and interval.low,
-            "speedup_high": interval and interval.high,
-            "verdict": comparison and comparison.verdict,
+            **speedup_columns(comparison),
             "ratio": comparison and comparison.ratio,
             "paired": comparison.rounds if comparison else 0,
         }

@@ -17,7 +17,13 @@ from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, DISK, Evidence
 from cembench.report.declarations import own
 from cembench.report.document import Column, Finding, Plain, Table, Value, missing
-from cembench.results.comparison import Comparison, compare_ratios, paired_ratios, verdict_of
+from cembench.results.comparison import (
+    Comparison,
+    compare_ratios,
+    middle_ratio,
+    paired_ratios,
+    verdict_of,
+)
 from cembench.results.families import (
     FEWEST_FAMILIES,
     average_interval,
@@ -170,7 +176,7 @@ def _speeds(
     if not ratios:
         return None
     if len(set(families)) >= FEWEST_FAMILIES:
-        middles = [exp(median(map(log, ratio))) for ratio in ratios]
+        middles = list(map(middle_ratio, ratios))
         over = _over_families(middles, families)
         return Comparison(over.mean, over.interval, verdict_of(over.interval), len(ratios))
     rounds = min(map(len, ratios))
