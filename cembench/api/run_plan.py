@@ -23,13 +23,7 @@ from cembench.running.estimate import Estimate, estimate, planned_seconds
 from cembench.running.external.installed import missing
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import (
-    Provenance,
-    Task,
-    mesh_files,
-    provenance_of,
-    provenances,
-)
+from cembench.running.plan import Provenance, Task, mesh_files, provenance_of, provenances
 from cembench.running.surfaces import (
     generate_surface,
     is_generated,

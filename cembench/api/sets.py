@@ -60,11 +60,7 @@ SETS = "cembench.sets"
 
 
 def surfaces_of_set(
-    name: str,
-    registry: Registry,
-    *,
-    limit: int | None = None,
-    progress: ShowProgress = _quietly,
+    name: str, registry: Registry, *, limit: int | None = None, progress: ShowProgress = _quietly
 ) -> Iterator[Provided]:
     """Yield the surfaces of a set, ready to be mapped, each with its name and source.
 

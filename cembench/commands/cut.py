@@ -50,8 +50,7 @@ def cut(
         bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
     ] = False,
     force: Annotated[
-        bool,
-        typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv."),
+        bool, typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv.")
     ] = False,
     as_json: Json = False,
 ) -> None:

@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING
 from cembench.api.benchmark import benchmark
 from cembench.api.settings import registry_with
 from cembench.commands.app import app
-from cembench.commands.console import (
-    SHOWN,
-    Json,
-    fail,
-    failures,
-    out,
-    print_json,
-    split,
-)
+from cembench.commands.console import SHOWN, Json, fail, failures, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Meshes, OutputRun, Surfaces

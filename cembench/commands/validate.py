@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     "cembench validate mine.py:fast --against cem,fdm --profile quick -o results/mine  ·  "
     "cembench validate mine.py --require not-slower"
 )
-@from_api(
-    validate_solver,
-    without=("reporter",),
-    require="--require WHAT",
-)
+@from_api(validate_solver, without=("reporter",), require="--require WHAT")
 def validate(
     call: Call,
     plugin: Annotated[

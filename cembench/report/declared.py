@@ -40,14 +40,7 @@ from cembench.report.by_surface import (
 from cembench.report.content.causes import by_cause
 from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration, filled, own, parsed
-from cembench.report.document import (
-    Column,
-    Table,
-    Value,
-    entry,
-    of_status,
-    words,
-)
+from cembench.report.document import Column, Table, Value, entry, of_status, words
 from cembench.results.columns import (
     COLUMNS,
     FrameColumn,

@@ -62,12 +62,7 @@ class Point(NamedTuple):
 
 
 def through(
-    name: str,
-    points: Sequence[Point],
-    kind: Kind,
-    look: SeriesStyle = PLAIN,
-    *,
-    named: bool = True,
+    name: str, points: Sequence[Point], kind: Kind, look: SeriesStyle = PLAIN, *, named: bool = True
 ) -> PlotSeries:
     """Return a series of points with their tooltips."""
     x, y = [p.x for p in points], [p.y for p in points]

@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from cembench.conformal.texel_density import (
-    ISLANDS,
-    density_words,
-    needs_islands,
-    texture_words,
-)
+from cembench.conformal.texel_density import ISLANDS, density_words, needs_islands, texture_words
 from cembench.report.declarations import own
 from cembench.report.document import Column, Table
 from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant

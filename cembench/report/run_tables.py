@@ -7,17 +7,7 @@ from dataclasses import replace
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
-from cembench.report.document import (
-    Column,
-    Item,
-    Plain,
-    Section,
-    Table,
-    Text,
-    Value,
-    entry,
-    words,
-)
+from cembench.report.document import Column, Item, Plain, Section, Table, Text, Value, entry, words
 from cembench.results.columns import marks_explained
 from cembench.results.comparison import Comparison, compare, reference_of, references
 from cembench.results.frame import listed

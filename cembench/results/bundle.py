@@ -188,10 +188,7 @@ _CONTEXT = [f"{ROCRATE}/context", {"sha256": "https://schema.org/sha256"}]
 
 
 def _crate(
-    store: Store,
-    files: Mapping[str, bytes],
-    about: Mapping[str, str],
-    surfaces: Mapping[str, str],
+    store: Store, files: Mapping[str, bytes], about: Mapping[str, str], surfaces: Mapping[str, str]
 ) -> list[dict[str, Any]]:
     """Return the entities of the metadata."""
     records, environments = store.records(), store.environments()

@@ -46,13 +46,7 @@ from cembench.report.document import (
     groups_of,
     items_of,
 )
-from cembench.report.pictures import (
-    embed_pixels,
-    embed_vector,
-    pixel_cap,
-    size_of,
-    unreadable,
-)
+from cembench.report.pictures import embed_pixels, embed_vector, pixel_cap, size_of, unreadable
 from cembench.report.render import templates
 from cembench.results.columns import COLUMNS
 
