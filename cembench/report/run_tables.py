@@ -62,15 +62,13 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         return None
     title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
     several = len({record.cell.solves for record, _ in compared}) > 1
-    compared_by_name = [
-        (record.cell.mesh, named(record), f" ({record.cell.solves})" if several else "", comparison)
-        for record, comparison in compared
-    ]
-    if all(comparison.verdict == FEW_ROUNDS for _, comparison in compared):
-        names = list(dict.fromkeys(name for _, name, _, _ in compared_by_name))
+    policies = [f" ({record.cell.solves})" if several else "" for record, _ in compared]
+    found = [comparison for _, comparison in compared]
+    if all(comparison.verdict == FEW_ROUNDS for comparison in found):
+        names = list(dict.fromkeys(named(record) for record, _ in compared))
         lines: dict[str, dict[str, float]] = {}
-        for mesh, name, policy, comparison in compared_by_name:
-            lines.setdefault(mesh + policy, {})[name] = comparison.speedup
+        for (record, comparison), policy in zip(compared, policies, strict=True):
+            lines.setdefault(record.cell.mesh + policy, {})[named(record)] = comparison.speedup
         note = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
             f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
@@ -78,20 +76,13 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         columns = [SURFACE, *(Column(n, form=".2f", lacking="not timed") for n in names)]
         rows = [[mesh, *map(line.get, names)] for mesh, line in lines.items()]
         return Table.of("speedups", title, columns, rows, notes=(note,))
-    together = corrected([comparison for _, comparison in compared])
-    return Table.of(
-        "speedups",
-        title,
-        [
-            *(SURFACE, ALGORITHM, Column("speedup", form=".2f"), Column("95 % interval")),
-            Column(f"than {reference}", numeric=False),
-        ],
-        [
-            [mesh, name + policy, one.speedup, _sure(one), one.verdict]
-            for (mesh, name, policy, _), one in zip(compared_by_name, together, strict=True)
-        ],
-        notes=tuple(_corrected_words([comparison for _, comparison in compared])),
-    )
+    columns = [SURFACE, ALGORITHM, Column("speedup", form=".2f"), Column("95 % interval")]
+    columns.append(Column(f"than {reference}", numeric=False))
+    compared_rows: list[list[Plain]] = [
+        [record.cell.mesh, named(record) + policy, one.speedup, _sure(one), one.verdict]
+        for (record, _), policy, one in zip(compared, policies, corrected(found), strict=True)
+    ]
+    return Table.of("speedups", title, columns, compared_rows, notes=tuple(_corrected_words(found)))
 
 
 def contest_tables(records: Sequence[Record], reference: str) -> list[Table]:

@@ -15,7 +15,7 @@ import importlib.util
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -288,10 +288,8 @@ class Paper(Declaration):
 
     def table_of(self, column: str) -> int | None:
         """Return the number of the printed table with this column of the frame, if any."""
-        return next(
-            (n for n, table in self.printed.items() if column in {f.column for f in table.figures}),
-            None,
-        )
+        numbers = (n for n, t in self.printed.items() if column in {f.column for f in t.figures})
+        return next(numbers, None)
 
     @property
     def misprints(self) -> Mapping[tuple[int, str, str], str]:
@@ -322,14 +320,8 @@ class Paper(Declaration):
 
     def exhibited(self, exhibit: str, models: Sequence[str] = ()) -> str:
         """Return the figure that an exhibit of this kind on these models is; "" if none."""
-        return next(
-            (
-                one.figure
-                for one in self.exhibits
-                if one.exhibit == exhibit and one.models in ((), tuple(models))
-            ),
-            "",
-        )
+        of_kind = (one for one in self.exhibits if one.exhibit == exhibit)
+        return next((one.figure for one in of_kind if one.models in ((), tuple(models))), "")
 
     def as_printed(self, model: str, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
         """Return the parameters with which the paper ran algorithms on this model of its own.
@@ -449,7 +441,8 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         what = first["msg"].removeprefix("Value error, ")
         what = what[0].lower() + what[1:]
         raise _wrong(file, ".".join(map(str, first["loc"])), what) from error
-    _check(paper)
+    for name, where, what in _unmatched(paper):
+        raise _wrong(folder / name, where, what)
     if not paper.models:
         everywhere = [
             claim.model_copy(update={"rows": OF_ANY}) if claim.rows == OF_MODELS else claim
@@ -459,16 +452,15 @@ def read_paper(folder: Path, package: str = "") -> Paper:
     return paper
 
 
-def _check(paper: Paper) -> None:
-    """Raise if one part of a paper names what another does not have."""
+def _unmatched(paper: Paper) -> Iterator[tuple[str, str, str]]:
+    """Yield where one part of a paper names what another does not have: file, place, what."""
     if paper.reference not in paper.algorithms:
         known = ", ".join(paper.algorithms)
         what = f"{paper.reference!r} is none of the paper's algorithms ({known})"
-        raise _wrong(paper.folder / "paper.toml", "reference", what)
+        yield "paper.toml", "reference", what
     for number, model, column in paper.misprints:
         if column not in paper.tables.get(number, {}).get(model, {}):
-            what = f"table {number} has no cell {column!r} of {model!r}"
-            raise _wrong(paper.folder / "tables.toml", "errata", what)
+            yield "tables.toml", "errata", f"table {number} has no cell {column!r} of {model!r}"
     named = [*paper.surfaces, *(picture.model for picture in paper.pictures)]
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
@@ -477,19 +469,18 @@ def _check(paper: Paper) -> None:
     for model in named:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
-            raise _wrong(paper.folder, f"model {model!r}", what)
+            yield "", f"model {model!r}", what
     for model in paper.models if paper.tables else ():
         if not paper.faces(model):
-            what = f"no table has the column 'faces' for {model!r}"
-            raise _wrong(paper.folder / "tables.toml", "tables", what)
+            yield "tables.toml", "tables", f"no table has the column 'faces' for {model!r}"
     names = [claim.name for claim in paper.claims]
     for name in paper.headline:
         if name not in names:
             what = f"there is no claim {name!r}; known: {', '.join(names) or 'none'}"
-            raise _wrong(paper.folder / "paper.toml", "headline", what)
+            yield "paper.toml", "headline", what
     for name in names:
         if names.count(name) > 1:
-            raise _wrong(paper.folder / "claims.toml", f"claim {name!r}", "occurs twice")
+            yield "claims.toml", f"claim {name!r}", "occurs twice"
 
 
 def _wrong(file: Path, where: str, what: str) -> RegistryError:

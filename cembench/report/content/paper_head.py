@@ -55,7 +55,8 @@ def headline(evidence: Evidence) -> str:
     reference, others = paper.reference.upper(), [name.upper() for name in paper.compared]
     won, lost = (int((rows["verdict"] == one).sum()) for one in ("slower", "faster"))
     if not won + lost:
-        start = f"The rounds are too few to say whether {reference} is faster than {_any(others)}."
+        any_of = listed(others, "or")
+        start = f"The rounds are too few to say whether {reference} is faster than {any_of}."
     elif not lost:
         start = f"{reference} is faster than {listed(others)} wherever these rounds decide it"
         start += f" ({won} of {len(rows)} comparisons)."
@@ -82,11 +83,6 @@ def origins_of(evidence: Evidence) -> dict[MeshOrigin, str]:
         for origin, words in _ORIGINS.items()
         if origin in here
     }
-
-
-def _any(names: Sequence[str]) -> str:
-    *first, last = names
-    return f"{', '.join(first)} or {last}" if first else last
 
 
 def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:

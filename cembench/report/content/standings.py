@@ -199,10 +199,8 @@ def standings(contest: Mapping[str, Any]) -> Table:
         Column("algorithm", numeric=False),
         *(Column("valid maps"), Column("mean angle error", unit="°", form=".2f")),
         *(Column(f"error over {contest['best']}'s"), Column("smallest on", detail=True)),
-        *(
-            Column(f"within {contest['within']} % on", detail=True),
-            Column(f"time over {good[0]}'s"),
-        ),
+        Column(f"within {contest['within']} % on", detail=True),
+        Column(f"time over {good[0]}'s"),
     ]
     rows = list(_ranked(contest))
     fitted, few = "stand-ins were fitted to its angle errors", "too few valid maps to be compared"
@@ -212,19 +210,15 @@ def standings(contest: Mapping[str, Any]) -> Table:
     ]
     name = "standings" if contest["target"] == DISK else f"standings-{slug(contest['target'])}"
     but = "" if len(good) > 1 else " No other is about as good."
-    return Table.of(
-        name,
-        f"{contest['title']}, ranked by their angle errors",
-        columns,
-        rows,
-        notes=(
-            f"Over {contest['on']}; solves: {contest['policy']}. The smallest are the angle "
-            f"errors of {order[0]}. The fastest is {good[0]}, of the maps about as good as the "
-            f"best: at most {AS_GOOD} times the smallest error, or {DEGREES}° larger, on every "
-            f"surface.{but} In brackets are 95 % intervals, of angles where there are "
-            f"{FEWEST_FAMILIES} families of surfaces.",
-        ),
+    note = (
+        f"Over {contest['on']}; solves: {contest['policy']}. The smallest are the angle errors of "
+        f"{order[0]}. The fastest is {good[0]}, of the maps about as good as the best: at most "
+        f"{AS_GOOD} times the smallest error, or {DEGREES}° larger, on every surface.{but} In "
+        f"brackets are 95 % intervals, of angles where there are {FEWEST_FAMILIES} families of "
+        "surfaces."
     )
+    title = f"{contest['title']}, ranked by their angle errors"
+    return Table.of(name, title, columns, rows, notes=(note,))
 
 
 def rank_tables(contests: Sequence[Mapping[str, Any]]) -> list[Table]:
@@ -270,10 +264,9 @@ def contest_figures(contest: Mapping[str, Any]) -> list[Finding]:
     return figures
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], last: str = "and") -> str:
     """Return names as "a, b and c"."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def surfaces_words(surfaces: int, families: int) -> str:
