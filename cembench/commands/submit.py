@@ -76,9 +76,9 @@ def _table(checked: Sequence[Submission]) -> Table:
         "submissions",
         f"{sum(one.accepted for one in checked)} of {len(checked)} bundles accepted",
         [
-            *(Column(title, numeric=False) for title in ("bundle", "found", "machines")),
+            *("bundle", "found", "machines"),
             *(Column(title, form=",d") for title in ("cells", "maps")),
-            Column("signed by", numeric=False),
+            "signed by",
         ],
         [
             [

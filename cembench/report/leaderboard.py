@@ -262,7 +262,7 @@ def _success(frame: pd.DataFrame) -> Table:
     return Table.of(
         "success-by-family",
         "Valid maps by family of surfaces",
-        [Column("algorithm", numeric=False), *(Column(name) for name in [*families, "all"])],
+        ["algorithm", *map(Column, [*families, "all"])],
         rows,
         caption="Shares of the cells that ended with a valid map; each opens the first that did "
         "not, or else the first.",
@@ -296,15 +296,14 @@ def _machines(entrants: Sequence[Entrant]) -> Table:
                     entrant.signer or "-",
                 ]
             )
-    text = ("run", "machine", "processor")
     return Table.of(
         "machines",
         "Machines and software",
         [
-            *(Column(t, numeric=False) for t in text),
+            *("run", "machine", "processor"),
             Column("cores", form=",d", lacking="not recorded"),
             Column("kernel", unit="ms"),
-            *(Column(t, numeric=False) for t in ("cembench", "commit", "signed by")),
+            *("cembench", "commit", "signed by"),
         ],
         rows,
         caption="Kernel: a fixed factorisation that is timed in every round.",
@@ -333,7 +332,7 @@ def _cells(frame: pd.DataFrame) -> Table:
         "every-cell",
         "Run by run",
         [
-            *(Column(t, numeric=False) for t in ("run", "machine", "surface", "algorithm", "how")),
+            *("run", "machine", "surface", "algorithm", "how"),
             Column("mean angle error", unit="°"),
             Column("seconds", unit="s"),
         ],

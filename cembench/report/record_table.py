@@ -7,7 +7,7 @@ from typing import Any
 
 from cembench.conformal.texel_density import ISLANDS, density_words, needs_islands, texture_words
 from cembench.report.declarations import own
-from cembench.report.document import Column, Table
+from cembench.report.document import Table
 from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
 from cembench.results.frame import filled, phrase
 from cembench.results.papers import paper_of
@@ -33,7 +33,7 @@ def figures_table(
     if full and (advice := texture_advice(record)):
         rows.append(("note", advice))
     rows += ((name, words) for name, words in more if words)
-    return Table.of("record", "", [Column("", numeric=False)] * 2, rows)
+    return Table.of("record", "", ["", ""], rows)
 
 
 def texture_advice(record: Record) -> str:

@@ -164,7 +164,7 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> Table:
     return Table.of(
         "surface-facts",
         "",
-        [Column("surface", numeric=False), *columns, Column("in print", numeric=False)],
+        ["surface", *columns, "in print"],
         rows,
         notes=(
             "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM",

@@ -31,7 +31,7 @@ from urllib.parse import quote, unquote
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import RecordError
-from cembench.core.loading import files_in, is_there, read_bytes
+from cembench.core.loading import files_in, is_there, read_bytes, sha256_of
 from cembench.core.names import distinct_slugs
 from cembench.results.machines import machine_of, machine_of_record
 from cembench.results.records import Record
@@ -419,13 +419,8 @@ def _other_files(folder: Path, names: Sequence[str]) -> Iterator[str]:
             yield f"{name} is not in {METADATA}"
         elif name not in names:
             yield f"{name} is missing"
-        elif _sha256(folder / name) != stated[name]:
+        elif sha256_of(folder / name) != stated[name]:
             yield f"{name} does not have the SHA-256 that {METADATA} gives it"
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _hashes(path: Path) -> dict[str, Any]:

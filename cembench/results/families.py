@@ -22,8 +22,8 @@ surfaces as independent and bootstraps of families.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from math import exp, isclose, isnan, sqrt
-from statistics import median
+from math import exp, isclose, isnan, log, sqrt
+from statistics import mean, median
 
 import numpy as np
 
@@ -43,6 +43,11 @@ def family_means(figures: Sequence[float], families: Sequence[Hashable]) -> list
     for figure, family in zip(figures, families, strict=True):
         held.setdefault(family, []).append(float(figure))
     return [sum(own) / len(own) for own in held.values()]
+
+
+def family_geometric(figures: Sequence[float], families: Sequence[Hashable]) -> float:
+    """Return the geometric mean over families of the geometric means within them."""
+    return exp(mean(family_means(list(map(log, figures)), families)))
 
 
 def share_interval(share: float, families: int) -> Interval:

@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from math import exp, log
-from statistics import mean
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -22,6 +20,7 @@ from cembench.results.columns import significant
 from cembench.results.expressions import computed, names_in
 from cembench.results.families import (
     average_interval,
+    family_geometric,
     family_means,
     rate_interval,
     share_interval,
@@ -114,8 +113,7 @@ def _wins(of: pd.Series, families: pd.Series) -> tuple[int, int]:
 
 def _family_geometric(of: pd.Series, families: pd.Series) -> float | None:
     known = of.dropna()
-    means = family_means(list(map(log, known)), list(families[known.index]))
-    return exp(mean(means)) if means else None
+    return family_geometric(list(known), list(families[known.index])) if len(known) else None
 
 
 def _family_interval(of: pd.Series, families: pd.Series) -> str | None:

@@ -190,7 +190,7 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
         "summary",
         "Beside the baselines",
         [
-            Column("figure", numeric=False),
+            "figure",
             *(Column(t, "surfaces", lacking=whole) for t in ("lower", "equal", "higher")),
             Column("median ratio", form=".3f", lacking=_TOO_FEW),
             *_ENDS,
@@ -208,7 +208,7 @@ def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
 
 def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
     program = ("start", "solve") if against.solve_time else ()
-    columns = [Column("surface", numeric=False), Column("faces")]
+    columns: list[Column | str] = ["surface", Column("faces")]
     for group in (against.energy_name, "mean angle error, °", "seconds"):
         columns += [Column(title, group), Column(against.title, group, detail=True)]
         columns += [
@@ -272,7 +272,7 @@ def _growth_table(compared: GrowthComparison) -> Table:
         "growth",
         "Seconds by number of triangles",
         [
-            Column("what", numeric=False),
+            "what",
             *(Column(f"{faces:,}", "faces") for faces in sizes),
             *(replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)),
         ],

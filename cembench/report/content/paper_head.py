@@ -12,7 +12,6 @@ from cembench.report.content.standings import listed
 from cembench.report.document import (
     VERDICTS,
     Claim,
-    Column,
     Plain,
     Table,
     Tone,
@@ -89,7 +88,6 @@ def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
     """Return the main claims: what is printed, and what holds here by the origin of surfaces."""
     origins = origins_of(evidence)
     titles = ("claim", "printed", *(origins.values() or ["here"]))
-    columns = [Column(title, numeric=False) for title in titles]
     rated = evidence.paper.stated.get("rate")
     rows = list(_rate_rows(evidence, list(origins)))[:ROWS] if rated else []
     rows += list(_claim_rows(evidence, tested, list(origins)))[: ROWS - len(rows)]
@@ -102,7 +100,7 @@ def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
         "printed figure."
     )
     notes = (note,) if rated else ()
-    return Table.of("head", "The main claims", columns, rows, origin="", notes=notes)
+    return Table.of("head", "The main claims", titles, rows, origin="", notes=notes)
 
 
 def _rate_rows(evidence: Evidence, origins: Sequence[MeshOrigin]) -> Iterator[list[Plain]]:

@@ -195,8 +195,8 @@ def contests_of(evidence: Evidence, policy: str) -> list[dict[str, Any]]:
 def standings(contest: Mapping[str, Any]) -> Table:
     """Return the algorithms of a contest in a row each, the smallest angle errors first."""
     order, good = contest["order"], contest["good"]
-    columns = [
-        Column("algorithm", numeric=False),
+    columns: list[Column | str] = [
+        "algorithm",
         *(Column("valid maps"), Column("mean angle error", unit="°", form=".2f")),
         *(Column(f"error over {contest['best']}'s"), Column("smallest on", detail=True)),
         Column(f"within {contest['within']} % on", detail=True),
