@@ -72,14 +72,10 @@ class Catalogue:
 
 
 def _about(registered: Algorithm | Surface, **more: Any) -> dict[str, Any]:
-    return {
-        "name": registered.name,
-        "title": registered.title,
-        "source": registered.source,
-        "parameters": {p.name: p.default for p in registered.parameters},
-        "notes": registered.notes,
-        "origin": registered.origin,
-    } | more
+    parameters = {p.name: p.default for p in registered.parameters}
+    texts = {name: getattr(registered, name) for name in ("name", "title", "source")}
+    notes = {"notes": registered.notes, "origin": registered.origin}
+    return {**texts, "parameters": parameters, **notes, **more}
 
 
 def _plain(facts: SurfaceFacts | None) -> dict[str, Any] | None:

@@ -157,18 +157,11 @@ def about(dataset: Dataset) -> dict[str, Any]:
     """Return what is known of a public surface as plain data."""
     from cembench.mesh.datasets import is_fetched
 
+    texts = ("name", "title", "paper_row", "group")
+    facts = ("faces", "licence", "fetch_only", "note", "url", "sha256")
+    size = dataset.path.stat().st_size if dataset.path.is_file() else dataset.size
     return {
-        "name": dataset.name,
-        "title": dataset.title,
-        "paper_row": dataset.paper_row or None,
-        "group": dataset.group or None,
-        "faces": dataset.faces,
-        "licence": dataset.licence,
-        "fetch_only": dataset.fetch_only,
-        "note": dataset.note or None,
-        "url": dataset.url,
-        "sha256": dataset.sha256,
-        "size": dataset.path.stat().st_size if dataset.path.is_file() else dataset.size,
-        "fetched": is_fetched(dataset),
-        "path": str(dataset.path),
+        **{name: getattr(dataset, name) or None for name in texts},
+        **{name: None if (one := getattr(dataset, name)) == "" else one for name in facts},
+        **{"size": size, "fetched": is_fetched(dataset), "path": str(dataset.path)},
     }

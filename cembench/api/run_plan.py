@@ -276,10 +276,7 @@ def plan_summary(plan: Plan) -> dict[str, Any]:
     held, lacking, costs = plan.held(), plan.lacking(), plan.costs()
     cells = [
         {
-            "key": task.cell.key,
-            "mesh": task.cell.mesh,
-            "algorithm": task.cell.algorithm,
-            "solves": task.cell.solves,
+            **{name: getattr(task.cell, name) for name in ("key", "mesh", "algorithm", "solves")},
             "faces": task.facts.faces,
             "held": held.get(task.cell.key),
             "lacks": lacking.get(task.algorithm.name),

@@ -217,5 +217,4 @@ def _reason(record: Record) -> str:
 
 def _is_beside_work(record: Record) -> bool:
     rounds = record.outcome.rounds
-    busy = sum(bool(r.neighbours and r.neighbours.busy) for r in rounds)
-    return busy >= _BUSY_SHARE * len(rounds)
+    return sum(r.busy for r in rounds) >= _BUSY_SHARE * len(rounds)

@@ -229,14 +229,9 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     changing = [
         r.cell.mesh for r in records if of_kind(NoticeKind.NOT_DETERMINISTIC, r.outcome.notes)
     ]
-    repeated = finding(
-        "quality",
-        "repeatable in every round",
-        f"different bits in a later call on {', '.join(changing)}"
-        if changing
-        else "the same bits in every round",
-        ok=not changing,
-    )
+    bits = f"different bits in a later call on {', '.join(changing)}"
+    measured = bits if changing else "the same bits in every round"
+    repeated = finding("quality", "repeatable in every round", measured, ok=not changing)
     return [maps_every_surface("quality", records), repeated]
 
 
