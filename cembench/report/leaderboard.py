@@ -88,15 +88,12 @@ def leaderboard(entrants: Sequence[Entrant], command: str, folder: Path | None =
         Section("machines", "Machines", (_machines(entrants),)),
         Section("measured", "Every cell", (page,), (cells,)),
     )
-    about = (
-        ("runs", str(len(entrants))),
-        ("machines", str(frame["machine"].nunique())),
-        ("surfaces", str(frame["mesh_hash"].nunique())),
-        ("cells", f"{len(frame):,}, {int(frame['ok'].sum()):,} ok"),
-    )
+    counts = {"runs": "run", "machines": "machine", "surfaces": "mesh_hash"}
+    about = [(what, str(frame[name].nunique())) for what, name in counts.items()]
+    about.append(("cells", f"{len(frame):,}, {int(frame['ok'].sum()):,} ok"))
     rows = {row["record"]: row for row in frame.to_dict("records")}
     head = Findings((_leader_words(ranked),), tables=ranked, plot=next(iter(figures), None))
-    return Report("Leaderboard", command, about, sections, _shown(rows), head)
+    return Report("Leaderboard", command, tuple(about), sections, _shown(rows), head)
 
 
 #: Within each of these, seconds are comparable.
@@ -250,13 +247,7 @@ def _success(frame: pd.DataFrame) -> Table:
         cells: list[Plain] = [str(label)]
         for chosen in [*families, None]:
             some = group if chosen is None else group[group["family"] == chosen]
-            if some.empty:
-                cells.append(missing("it was not tried on this family"))
-                continue
-            first = some.sort_values(["ok", "record"]).iloc[0]
-            share = 100 * some["ok"].mean()
-            text = f"{share:.3g} % of {len(some)}"
-            cells.append(Value(text, share, "surface", str(first["record"])))
+            cells.append(_share(some) if len(some) else missing("it was not tried on this family"))
         rows.append(cells)
     rows.sort(key=lambda row: (-(row[-1].number or 0.0), row[0]))  # type: ignore[union-attr]
     return Table.of(
@@ -267,6 +258,12 @@ def _success(frame: pd.DataFrame) -> Table:
         caption="Shares of the cells that ended with a valid map; each opens the first that did "
         "not, or else the first.",
     )
+
+
+def _share(cells: pd.DataFrame) -> Value:
+    """Return the share of valid maps, which opens the first cell without one, or else the first."""
+    first, share = cells.sort_values(["ok", "record"]).iloc[0], 100 * cells["ok"].mean()
+    return Value(f"{share:.3g} % of {len(cells)}", share, "surface", str(first["record"]))
 
 
 def _machines(entrants: Sequence[Entrant]) -> Table:
@@ -284,18 +281,11 @@ def _machines(entrants: Sequence[Entrant]) -> Table:
             git = about.get("git") or {}
             seconds, key = sorted(kernels)[(len(kernels) - 1) // 2] if kernels else (None, "")
             kernel = seconds and 1000 * seconds
-            rows.append(
-                [
-                    entrant.name,
-                    machine_of(about) or "not named",
-                    str(about.get("cpu") or "-"),
-                    about.get("cores"),
-                    entry(kernel, ".3g", "no kernel was timed", origin="surface", record=key),
-                    str(about.get("cembench") or "-"),
-                    str(git.get("commit") or "-")[:10] + ("+" if git.get("dirty") else ""),
-                    entrant.signer or "-",
-                ]
-            )
+            timing = entry(kernel, ".3g", "no kernel was timed", origin="surface", record=key)
+            commit = str(git.get("commit") or "-")[:10] + ("+" if git.get("dirty") else "")
+            machine = (machine_of(about) or "not named", str(about.get("cpu") or "-"))
+            software = (str(about.get("cembench") or "-"), commit, entrant.signer or "-")
+            rows.append([entrant.name, *machine, about.get("cores"), timing, *software])
     return Table.of(
         "machines",
         "Machines and software",

@@ -57,12 +57,12 @@ def _known(record: Record) -> dict[str, Any]:
     outcome, known = record.outcome, {name: one.of(record) for name, one in COLUMNS.items()}
     seconds, spoken = outcome.median_seconds, seconds_words(record)
     chosen, tried = (outcome.extras.get(key) for key in ("chosen", "tried"))
+    phases = ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items())
     compared = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
     return known | {
         "in_the_paper": _printed(record) if record.mesh.paper_row else "",
-        "took": "" if seconds is None else spoken or f"{significant(seconds)} s",
-        "seconds_words": spoken,
-        "by_phase": ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items()),
+        "took": "" if seconds is None else f", {spoken or f'{significant(seconds)} s'}",
+        "timing": "" if seconds is None else spoken or f"{significant(seconds)} ({phases})",
         "given": [f"{name}={value}" for name, value in record.cell.parameters.items()],
         "chosen": chosen,
         "tried": [f"{name} {_compared(one)}" for name, one in compared.items()],

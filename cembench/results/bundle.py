@@ -327,17 +327,15 @@ def unpacked(
             try:
                 submissions[folder], records[name] = _checked(name, path, folder)
                 if signers is not None and submissions[folder].accepted:
-                    submissions[folder] = replace(
-                        submissions[folder], signer=signer(folder, signers, path.name)
-                    )
+                    by = signer(folder, signers, path.name)
+                    submissions[folder] = replace(submissions[folder], signer=by)
             except RecordError as error:
                 about = submissions.get(folder, Submission(name))
                 submissions[folder] = replace(about, faults=(str(error),))
         sound = {one.name: records[one.name] for one in submissions.values() if one.accepted}
         for name, far in far_from_others(sound).items():
-            submissions[Path(above) / name] = replace(
-                submissions[Path(above) / name], faults=tuple(far)
-            )
+            folder = Path(above) / name
+            submissions[folder] = replace(submissions[folder], faults=tuple(far))
         yield submissions
 
 

@@ -150,19 +150,14 @@ def _items(validation: Validation, stage: str, records: Mapping[str, Record]) ->
 
 def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
     titles = ("check", "found", "measured", "allowed")
+    bad = [finding for finding in findings if not finding.ok]
+    notes = [f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in bad]
     return Table.of(
         f"{stage}-findings",
         "Checks",
         [Column(title, numeric=False, detail=title == "allowed") for title in titles],
-        [
-            [finding.name, _found(finding), finding.measured, finding.allowed]
-            for finding in findings
-        ],
-        notes=tuple(
-            dict.fromkeys(
-                f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in findings if not f.ok
-            )
-        ),
+        [[one.name, _found(one), one.measured, one.allowed] for one in findings],
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 
@@ -211,9 +206,8 @@ def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, 
     columns: list[Column | str] = ["surface", Column("faces")]
     for group in (against.energy_name, "mean angle error, °", "seconds"):
         columns += [Column(title, group), Column(against.title, group, detail=True)]
-        columns += [
-            Column(name, group) for name in (*(program if group == "seconds" else ()), "ratio")
-        ]
+        own = program if group == "seconds" else ()
+        columns += [Column(name, group) for name in (*own, "ratio")]
     notes = ["a dash: no valid map, or no positive figure to divide by"]
     if program:
         notes.append(
