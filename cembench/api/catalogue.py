@@ -155,13 +155,11 @@ def catalogue(
             with reporter.busy(f"[{k}/{len(todo)}] {family.name}: making, mapping, drawing"):
                 facts[family.name] = find_facts(registry, family)
             reporter.info(f"[{k}/{len(todo)}] {family.name}")
+    algorithms = tuple(a for a in registry.algorithms.values() if target in (None, a.target))
     return Catalogue(
-        None
-        if kind == "surfaces"
-        else tuple(a for a in registry.algorithms.values() if target in (None, a.target)),
+        None if kind == "surfaces" else algorithms,
         None if kind == "algorithms" else tuple(registry.surfaces.values()),
-        tuple(registry.peers),
-        facts,
+        *(tuple(registry.peers), facts),
     )
 
 

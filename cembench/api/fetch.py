@@ -121,20 +121,12 @@ def fetch(
     missing = {one.path: one for one in wanted if not is_fetched(one)}
     if len(wanted) > 1:
         reporter.info(_intent(len({one.path for one in wanted}), list(missing.values())))
-    failed: dict[str, CembenchError] = {}
+    limits: dict[str, Any] = {"jobs": jobs, "timeout": timeout, "have": list(map(Path, have))}
     with (
         reporter.downloads(list(missing.values())) as progress,
-        closing(
-            fetch_all(
-                *(wanted,),
-                jobs=jobs,
-                timeout=timeout,
-                have=[Path(folder) for folder in have],
-                progress=progress,
-            )
-        ) as downloads,
+        closing(fetch_all(wanted, **limits, progress=progress)) as downloads,
     ):
-        failed |= {one.dataset.name: one.error for one in downloads if one.error is not None}
+        failed = {one.dataset.name: one.error for one in downloads if one.error is not None}
     if len(wanted) > 1:
         again = f", {len(failed)} failed; the same call tries them again" * bool(failed)
         reporter.info(f"{len(wanted) - len(failed)} of {len(wanted)} fetched{again}.")

@@ -14,6 +14,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from cembench.api.surface_collections import (
     Names,
@@ -211,6 +212,9 @@ def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibi
         refused = tuple((one.name, one.error, one.source) for one in collected.refused)
         why = ("surface", "reason", "from")
         tables.append(ExhibitTable(title="Not measured", columns=why, rows=refused))
+    facts: dict[str, Any] = {"sets": list(sets), "given": count}
+    facts["measured"] = len(collected.surfaces)
+    facts["refused"] = {one.name: one.error for one in collected.refused}
     return Exhibit(
         name=EXHIBIT,
         title="The surfaces",
@@ -218,10 +222,5 @@ def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibi
         command=command,
         origin="surface",
         tables=tuple(tables),
-        facts={
-            "sets": list(sets),
-            "given": count,
-            "measured": len(collected.surfaces),
-            "refused": {one.name: one.error for one in collected.refused},
-        },
+        facts=facts,
     )

@@ -302,33 +302,17 @@ def _machines(entrants: Sequence[Entrant]) -> Table:
 
 def _cells(frame: pd.DataFrame) -> Table:
     order = ["family", "faces", "mesh", "label", "run"]
-    rows = [
-        [
-            row["run"],
-            row["machine"] or "not named",
-            row["surface"],
-            row["label"],
-            Value(row["status"], record=row["record"]),
-            *(
-                Value(significant(number), number, "surface", row["record"])
-                if isfinite(number := row[name])
-                else missing("it has no such figure")
-                for name in (ANGLE, "seconds")
-            ),
-        ]
-        for row in frame.sort_values(order).to_dict("records")
-    ]
-    return Table.of(
-        "every-cell",
-        "Run by run",
-        [
-            *("run", "machine", "surface", "algorithm", "how"),
-            Column("mean angle error", unit="°"),
-            Column("seconds", unit="s"),
-        ],
-        rows,
-        notes=("Seconds of different machines do not compare.",),
-    )
+    rows: list[list[Plain]] = []
+    for row in frame.sort_values(order).to_dict("records"):
+        figures = (row[n] if isfinite(row[n]) else None for n in (ANGLE, "seconds"))
+        how, lacking = {"origin": "surface", "record": row["record"]}, "it has no such figure"
+        rows.append([row["run"], row["machine"] or "not named", row["surface"], row["label"]])
+        rows[-1].append(Value(row["status"], record=row["record"]))
+        rows[-1] += [entry(figure, significant, lacking, **how) for figure in figures]
+    columns = [Column("mean angle error", unit="°"), Column("seconds", unit="s")]
+    titles = ("run", "machine", "surface", "algorithm", "how")
+    notes = ("Seconds of different machines do not compare.",)
+    return Table.of("every-cell", "Run by run", [*titles, *columns], rows, notes=notes)
 
 
 def _shown(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

@@ -262,18 +262,14 @@ def _growth_table(compared: GrowthComparison) -> Table:
         at = dict(zip(growth.faces, growth.seconds, strict=True))
         cells = [entry(at.get(f), ".4f", "not timed", origin="surface") for f in sizes]
         rows.append([growth.what, *cells, growth.exponent, *_ends(growth.interval)])
-    return Table.of(
-        "growth",
-        "Seconds by number of triangles",
-        [
-            "what",
-            *(Column(f"{faces:,}", "faces") for faces in sizes),
-            *(replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)),
-        ],
-        rows,
-        caption="Exponent: of the seconds between the two largest sizes, the median over the "
-        f"rounds. {_CLOCKS[compared.clock]}",
+    columns = [Column(f"{faces:,}", "faces") for faces in sizes]
+    columns += [replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)]
+    caption = (
+        "Exponent: of the seconds between the two largest sizes, the median over the rounds. "
+        f"{_CLOCKS[compared.clock]}"
     )
+    title = "Seconds by number of triangles"
+    return Table.of("growth", title, ["what", *columns], rows, caption=caption)
 
 
 def _growth_plot(compared: GrowthComparison) -> Plot:
