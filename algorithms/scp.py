@@ -15,6 +15,7 @@ from cembench.conformal.curvature import mixed_vertex_areas
 from cembench.conformal.free_boundary import conformal_energy_form, is_strip, unrolled, with_area_pi
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
@@ -23,8 +24,6 @@ from cembench.linear_algebra.dense_cholesky import DenseCholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Apply = Callable[[Complex], Complex]
 #: The weights of a map's size: boundary vertices equal or by length, or all vertices by area.
 Weights = Literal["boundary", "length", "area"]

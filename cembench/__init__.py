@@ -12,103 +12,20 @@ Names are loaded when they are first used, so that importing the package costs l
 
 from __future__ import annotations
 
+import ast
 import importlib
 import sys
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from cembench.api.benchmark import Run as Run
-    from cembench.api.benchmark import benchmark as benchmark
-    from cembench.api.catalogue import Catalogue as Catalogue
-    from cembench.api.catalogue import catalogue as catalogue
-    from cembench.api.catalogue import list_algorithms as list_algorithms
-    from cembench.api.catalogue import list_surfaces as list_surfaces
-    from cembench.api.catalogue import surface as surface
-    from cembench.api.cut import cut as cut
-    from cembench.api.fetch import PublicSurfaces as PublicSurfaces
-    from cembench.api.fetch import fetch as fetch
-    from cembench.api.map_files import map_files as map_files
-    from cembench.api.measure import measure as measure
-    from cembench.api.morph_surfaces import morph as morph
-    from cembench.api.papers import check_paper as check_paper
-    from cembench.api.parameterize import Result as Result
-    from cembench.api.parameterize import parameterize as parameterize
-    from cembench.api.parameterize_many import parameterize_many as parameterize_many
-    from cembench.api.repair import Repair as Repair
-    from cembench.api.repair import repair as repair
-    from cembench.api.reproduce import Reproduction as Reproduction
-    from cembench.api.reproduce import reproduce as reproduce
-    from cembench.api.submissions import check_submissions as check_submissions
-    from cembench.api.submissions import submit as submit
-    from cembench.api.terrain import terrain as terrain
-    from cembench.api.validate import validate as validate
-    from cembench.core.errors import AlgorithmFailed as AlgorithmFailed
-    from cembench.core.errors import CembenchError as CembenchError
-    from cembench.core.errors import DatasetError as DatasetError
-    from cembench.core.errors import MeshError as MeshError
-    from cembench.core.errors import NotPositiveDefinite as NotPositiveDefinite
-    from cembench.core.errors import ParameterError as ParameterError
-    from cembench.core.errors import RecordError as RecordError
-    from cembench.core.errors import RegistryError as RegistryError
-    from cembench.core.errors import RenderError as RenderError
-    from cembench.core.extras import MissingExtra as MissingExtra
-    from cembench.core.parameterization import Atlas as Atlas
-    from cembench.core.parameterization import MapStep as MapStep
-    from cembench.core.parameterization import Parameterization as Parameterization
-    from cembench.mesh.files import read_mesh as read_mesh
-    from cembench.mesh.files import write_mesh as write_mesh
-    from cembench.mesh.triangle_mesh import DiskMesh as DiskMesh
-    from cembench.mesh.triangle_mesh import HoledMesh as HoledMesh
-    from cembench.mesh.triangle_mesh import TriangleMesh as TriangleMesh
-    from cembench.registry import algorithm as algorithm
-    from cembench.registry import external_program as external_program
-    from cembench.registry import surface_family as surface_family
-    from cembench.results.bundle import Submission as Submission
-    from cembench.running.surfaces import load_surface as load_surface
-
-#: Where each public name lies.
-_PLACES = {
-    "cembench.core.errors": (
-        "AlgorithmFailed",
-        "CembenchError",
-        "DatasetError",
-        "MeshError",
-        "NotPositiveDefinite",
-        "ParameterError",
-        "RecordError",
-        "RegistryError",
-        "RenderError",
-    ),
-    "cembench.core.extras": ("MissingExtra",),
-    "cembench.core.parameterization": ("Atlas", "MapStep", "Parameterization"),
-    "cembench.mesh.files": ("read_mesh", "write_mesh"),
-    "cembench.mesh.triangle_mesh": ("DiskMesh", "HoledMesh", "TriangleMesh"),
-    "cembench.registry": ("algorithm", "external_program", "surface_family"),
-    "cembench.running.surfaces": ("load_surface",),
-    "cembench.api.benchmark": ("Run", "benchmark"),
-    "cembench.api.catalogue": (
-        "Catalogue",
-        "catalogue",
-        "list_algorithms",
-        "list_surfaces",
-        "surface",
-    ),
-    "cembench.api.cut": ("cut",),
-    "cembench.api.fetch": ("PublicSurfaces", "fetch"),
-    "cembench.api.map_files": ("map_files",),
-    "cembench.api.measure": ("measure",),
-    "cembench.api.morph_surfaces": ("morph",),
-    "cembench.api.parameterize": ("Result", "parameterize"),
-    "cembench.api.parameterize_many": ("parameterize_many",),
-    "cembench.api.repair": ("Repair", "repair"),
-    "cembench.api.reproduce": ("Reproduction", "reproduce"),
-    "cembench.api.papers": ("check_paper",),
-    "cembench.api.submissions": ("check_submissions", "submit"),
-    "cembench.results.bundle": ("Submission",),
-    "cembench.api.terrain": ("terrain",),
-    "cembench.api.validate": ("validate",),
+_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+#: Where each public name lies, by the imports of `__init__.pyi`.
+_PLACE_OF = {
+    alias.name: str(node.module)
+    for node in _STUB.body
+    if isinstance(node, ast.ImportFrom) and node.module != "typing"
+    for alias in node.names
 }
-_PLACE_OF = {name: place for place, names in _PLACES.items() for name in names}
 
 __all__ = sorted((*_PLACE_OF, "__version__"))
 

@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import (
-    Body,
-    Noise,
-    Real,
-    bump,
-    cone,
-    ellipsoid,
-    halfspace,
-    join,
-    meet,
-    to_surface,
-)
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, bump, cone, ellipsoid, halfspace, join, meet, to_surface
 
 
 def human_brain_body(seed: int = 0) -> Body:

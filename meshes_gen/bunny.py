@@ -2,19 +2,9 @@
 
 from __future__ import annotations
 
-from .implicit import (
-    Body,
-    Noise,
-    Real,
-    bump,
-    carve,
-    ellipsoid,
-    halfspace,
-    join,
-    rotation,
-    sphere,
-    tube,
-)
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, bump, carve, ellipsoid, halfspace, join, rotation, sphere, tube
 
 
 def stanford_bunny_body(seed: int = 0) -> Body:

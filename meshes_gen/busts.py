@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from cembench.core.arrays import Real
+
 from .head import NEUTRAL, Expression, Head, Person
 from .implicit import (
     Body,
     Noise,
-    Real,
     bump,
     carve,
     cone,

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import Body, Real, bump, join, meet
+from cembench.core.arrays import Real
+
+from .implicit import Body, bump, join, meet
 
 
 def cowboy_hat_body(seed: int = 0) -> Body:

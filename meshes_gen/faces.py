@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from cembench.core.arrays import Real
+
 from .head import NEUTRAL, POUTING, SMILE, WRY, Expression, Head, Person, with_skin
-from .implicit import Body, Field, Real, ellipsoid
+from .implicit import Body, Field, ellipsoid
 
 LIU = Person(jaw=1.0, nose=1.0, nose_width=1.0, lips=1.0, cheeks=1.0, skin_seed=11)
 HO = Person(

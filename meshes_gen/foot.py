@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import Body, Noise, Real, bump, ellipsoid, halfspace, join, sphere, tube
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, bump, ellipsoid, halfspace, join, sphere, tube
 
 #: Toes from the big toe on: base, joint, tip (toes point along -y), radii.
 TOES = [

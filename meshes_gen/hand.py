@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import Body, Noise, Real, box, bump, cone, ellipsoid, halfspace, join, tube
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, box, bump, cone, ellipsoid, halfspace, join, tube
 
 #: Knuckle, middle joint, last joint and tip of each finger; palm towards -y, fingers up.
 FINGERS = {

@@ -12,18 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .implicit import (
-    Field,
-    Noise,
-    Real,
-    carve,
-    cone,
-    ellipsoid,
-    join,
-    rotation,
-    sphere,
-    tube,
-)
+from cembench.core.arrays import Real
+
+from .implicit import Field, Noise, carve, cone, ellipsoid, join, rotation, sphere, tube
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Real
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
 from .cache import cached
 from .faces import HO, face_body, mask
 from .head import NEUTRAL, Head
-from .implicit import Body, Real, ellipsoid, sphere
+from .implicit import Body, ellipsoid, sphere
 from .levers import with_levers
 from .remesh import has_remeshing_filter, mesh_of
 from .rows import ROWS

@@ -9,13 +9,11 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
 from .levers import with_levers
-
-Complex = NDArray[np.complex128]
-Real = NDArray[np.float64]
 
 #: Distance of interior points from the circles, in edge lengths.
 CLEAR = 0.6

@@ -9,10 +9,9 @@ from typing import Annotated, Literal
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.core.arrays import Real
+from cembench.core.arrays import Indices, Real
 from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.soup import Soup
@@ -21,7 +20,6 @@ from cembench.registry import surface_family
 
 from .ict_model import EXPRESSIONS, IDENTITIES, FaceModel, load_model
 
-Ints = NDArray[np.int64]
 Part = Literal["face", "narrow", "head", "disk"]
 
 #: Number of available expressions that a random expression mixes.
@@ -83,8 +81,8 @@ class Triangulation:
 
     """
 
-    kept: Ints
-    F: Ints
+    kept: Indices
+    F: Indices
 
 
 def landmarks(mesh: TriangleMesh) -> dict[str, int]:
@@ -236,7 +234,7 @@ def triangulation(part: str, faces: int) -> Triangulation:
     return Triangulation(*_decimated(soup.V, F, faces))
 
 
-def _decimated(V: Real, F: Ints, faces: int) -> tuple[Ints, Ints]:
+def _decimated(V: Real, F: Indices, faces: int) -> tuple[Indices, Indices]:
     """Collapse edges to one of their ends; return the remaining vertices and the triangles."""
     require(Extra.STANDINS, "an ICT face of fewer triangles", "pymeshlab")
     import pymeshlab  # slow to import

@@ -20,16 +20,13 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Real
+from cembench.core.arrays import Indices, Real
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import DatasetError, MeshError, RecordError
 from cembench.core.wording import Advice
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.formats import obj
-
-Ints = NDArray[np.int64]
 
 #: Environment variable for the folder of the model's files.
 FOLDER_VARIABLE = "CEMBENCH_ICT_FACE"
@@ -69,8 +66,8 @@ class FaceModel:
     """
 
     V: Real
-    corners: Ints
-    sizes: Ints
+    corners: Indices
+    sizes: Indices
     identities: Mapping[str, Real]
     expressions: Mapping[str, Real]
 
@@ -131,7 +128,7 @@ def _loaded(folder: Path, there: tuple[tuple[str, int], ...]) -> FaceModel:
     return FaceModel(neutral, corners, sizes, modes(IDENTITIES), modes(EXPRESSIONS))
 
 
-def _arrays(folder: Path, name: str) -> tuple[Real, Ints, Ints]:
+def _arrays(folder: Path, name: str) -> tuple[Real, Indices, Indices]:
     """Return the kept vertices, corners and sizes of a file, small or as published."""
     small = folder / f"{name}.npz"
     if small.is_file():
@@ -185,7 +182,7 @@ def small_arrays(published: Path) -> bytes:
     return buffer.getvalue()
 
 
-def read_small(path: Path) -> tuple[Real, Ints, Ints] | None:
+def read_small(path: Path) -> tuple[Real, Indices, Indices] | None:
     """Return the arrays of a kept file; None if it is missing, incomplete or another file."""
     try:
         return _of_bytes(path.read_bytes())
@@ -193,7 +190,7 @@ def read_small(path: Path) -> tuple[Real, Ints, Ints] | None:
         return None
 
 
-def _of_bytes(content: bytes) -> tuple[Real, Ints, Ints]:
+def _of_bytes(content: bytes) -> tuple[Real, Indices, Indices]:
     with np.load(io.BytesIO(content), allow_pickle=False) as data:
         V = data["V"].astype(np.float64)
         corners, sizes = data["corners"].astype(np.int64), data["sizes"].astype(np.int64)

@@ -11,9 +11,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Real = NDArray[np.float64]
+from cembench.core.arrays import Real
+
 Field = Callable[[Real], Real]
 
 #: Points evaluated at once; temporary arrays then stay in the processor's cache.

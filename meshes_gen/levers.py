@@ -18,11 +18,10 @@ import numpy as np
 import scipy
 from pydantic import Field
 
+from cembench.core.arrays import Indices, Real
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-from .implicit import Real
 from .local_operations import (
-    Faces,
     boundary_mask,
     delaunay_flips,
     edges_of,
@@ -133,7 +132,7 @@ def hardened(mesh: M, levers: Levers, seed: int = 0) -> M:
     return type(mesh).from_arrays(V, F, name=mesh.name, notices=mesh.notices)
 
 
-def _on_boundary(F: Faces, n: int) -> Faces:
+def _on_boundary(F: Indices, n: int) -> Indices:
     """Return each boundary vertex with the vertices before and after it, (k, 3)."""
     edges = edges_of(F, n)
     ends = edges.ends[edges.on_boundary]
@@ -142,7 +141,7 @@ def _on_boundary(F: Faces, n: int) -> Faces:
     return np.stack([before[ends[:, 0]], *ends.T], axis=1)[np.argsort(ends[:, 0])]
 
 
-def _jagged(V: Real, F: Faces, jag: float, rng: np.random.Generator) -> Real:
+def _jagged(V: Real, F: Indices, jag: float, rng: np.random.Generator) -> Real:
     """Return vertices with those of the boundary moved across it, and room made behind them."""
     before, at, after = _on_boundary(F, len(V)).T
     along = V[after] - V[before]
@@ -162,7 +161,7 @@ def _jagged(V: Real, F: Faces, jag: float, rng: np.random.Generator) -> Real:
     return V
 
 
-def _smoothed(V: Real, F: Faces, over: float, even: float = 0.0) -> Real:
+def _smoothed(V: Real, F: Indices, over: float, even: float = 0.0) -> Real:
     """Return vertices smoothed over this many mean edges, the boundary held.
 
     Lengths are multiplied by the curvature over its mean to the power `even`.
@@ -172,7 +171,7 @@ def _smoothed(V: Real, F: Faces, over: float, even: float = 0.0) -> Real:
     return _filtered(V, V, F, over * edge * (_curvature(V, F) ** even if even else 1.0))
 
 
-def _filtered(X: Real, V: Real, F: Faces, length: Real | float) -> Real:
+def _filtered(X: Real, V: Real, F: Indices, length: Real | float) -> Real:
     """Return ``(M / length^2 + L)^-1 M / length^2 X`` with X (n, 3) held at the boundary.
 
     L and M are the mesh's cotangent Laplacian and vertex areas.
@@ -191,7 +190,7 @@ def _filtered(X: Real, V: Real, F: Faces, length: Real | float) -> Real:
     return X
 
 
-def _curvature(V: Real, F: Faces) -> Real:
+def _curvature(V: Real, F: Indices) -> Real:
     """Return the Gaussian curvature's modulus over its mean, averaged over five rings (n,)."""
     n = len(V)
     angles = np.empty(F.shape)
@@ -206,7 +205,7 @@ def _curvature(V: Real, F: Faces) -> Real:
     return np.asarray(np.clip(curvature[:, 0] / curvature[:, 0].mean(), 0.02, 50))
 
 
-def _centred(V: Real, F: Faces, loop: Faces) -> Real:
+def _centred(V: Real, F: Indices, loop: Indices) -> Real:
     """Return vertices with those of the boundary slid along it until they are balanced.
 
     The Moebius map of the disk that takes the mean of the boundary vertices' images to the centre
@@ -233,7 +232,7 @@ def _centred(V: Real, F: Faces, loop: Faces) -> Real:
     return V
 
 
-def boundary_angles(V: Real, F: Faces, loop: Faces) -> Real:
+def boundary_angles(V: Real, F: Indices, loop: Indices) -> Real:
     """Return where boundary vertices go in a conformal map to the disk, as angles (k,).
 
     The middle triangle goes to the centre: an arc is as long as its harmonic measure from there.

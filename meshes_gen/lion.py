@@ -4,19 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from .implicit import (
-    Body,
-    Noise,
-    Real,
-    bump,
-    carve,
-    cone,
-    ellipsoid,
-    halfspace,
-    join,
-    sphere,
-    tube,
-)
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, bump, carve, cone, ellipsoid, halfspace, join, sphere, tube
 
 
 def _curl(p: Real, centre: Real, outward: Real, radius: float, hand: int) -> Real:

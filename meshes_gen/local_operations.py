@@ -12,9 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.core.arrays import Real
-
-Faces = NDArray[np.int64]
+from cembench.core.arrays import Indices, Real
 
 
 @dataclass(frozen=True)
@@ -25,9 +23,9 @@ class Edges:
     triangles and their opposite corners; the second is -1 on the boundary.
     """
 
-    ends: Faces
-    face: Faces
-    corner: Faces
+    ends: Indices
+    face: Indices
+    corner: Indices
 
     @property
     def on_boundary(self) -> NDArray[np.bool_]:
@@ -35,7 +33,7 @@ class Edges:
         return self.face[:, 1] < 0
 
 
-def edges_of(F: Faces, n: int) -> Edges:
+def edges_of(F: Indices, n: int) -> Edges:
     """Return the edges of the triangles F, with the triangles on each side."""
     m = len(F)
     tail = F[:, [1, 2, 0]].ravel()
@@ -56,7 +54,7 @@ def edges_of(F: Faces, n: int) -> Edges:
     )
 
 
-def boundary_mask(F: Faces, n: int) -> NDArray[np.bool_]:
+def boundary_mask(F: Indices, n: int) -> NDArray[np.bool_]:
     """Whether each of the n vertices is on the boundary."""
     edges = edges_of(F, n)
     mask = np.zeros(n, dtype=bool)
@@ -64,20 +62,20 @@ def boundary_mask(F: Faces, n: int) -> NDArray[np.bool_]:
     return mask
 
 
-def compact(V: Real, F: Faces) -> tuple[Real, Faces]:
+def compact(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Return the same mesh without unused vertices."""
     used = np.zeros(len(V), dtype=bool)
     used[F] = True
     return V[used], (np.cumsum(used) - 1)[F]
 
 
-def area_vectors(V: Real, F: Faces) -> Real:
+def area_vectors(V: Real, F: Indices) -> Real:
     """Return normals of the triangles, with length twice their area; (m, 3)."""
     a, b, c = (V[F[:, k]] for k in range(3))
     return np.cross(b - a, c - a)
 
 
-def vertex_normals(V: Real, F: Faces) -> Real:
+def vertex_normals(V: Real, F: Indices) -> Real:
     """Return unit normals at the vertices, weighted by area; (n, 3)."""
     N = area_vectors(V, F)
     total = np.stack(
@@ -90,7 +88,7 @@ def vertex_normals(V: Real, F: Faces) -> Real:
     return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
 
-def mean_of_neighbours(V: Real, F: Faces) -> Real:
+def mean_of_neighbours(V: Real, F: Indices) -> Real:
     """Return the mean of each vertex's neighbours (n, 3); boundary neighbours count half."""
     n = len(V)
     total = np.zeros((n, 3))
@@ -112,8 +110,8 @@ def _ranks(priority: Real) -> NDArray[np.int64]:
 
 
 def split(
-    V: Real, F: Faces, edges: Edges, chosen: NDArray[np.int64], priority: Real
-) -> tuple[Real, Faces]:
+    V: Real, F: Indices, edges: Edges, chosen: NDArray[np.int64], priority: Real
+) -> tuple[Real, Indices]:
     """Split those `chosen` edges that have the first `priority` in both of their triangles."""
     rank = _ranks(priority)
     face, corner, ends = edges.face[chosen], edges.corner[chosen], edges.ends[chosen]
@@ -137,12 +135,12 @@ def split(
 
 def collapse(
     V: Real,
-    F: Faces,
+    F: Indices,
     edges: Edges,
     chosen: NDArray[np.int64],
     length: Real,
     most: int | None = None,
-) -> tuple[Real, Faces]:
+) -> tuple[Real, Indices]:
     """Collapse an independent set of the `chosen` edges, the shortest by `length` first.
 
     An edge stays if its collapse would change the topology, reverse a triangle, or join two
@@ -210,7 +208,7 @@ def collapse(
     return compact(V, F[alive])
 
 
-def _cotangents(V: Real, p: Faces, i: Faces, j: Faces) -> Real:
+def _cotangents(V: Real, p: Indices, i: Indices, j: Indices) -> Real:
     """Return the cotangent at p of the triangle p i j."""
     u, v = V[i] - V[p], V[j] - V[p]
     return (u * v).sum(axis=1) / np.maximum(np.linalg.norm(np.cross(u, v), axis=1), 1e-300)
@@ -220,11 +218,11 @@ def _cotangents(V: Real, p: Faces, i: Faces, j: Faces) -> Real:
 class Quads:
     """Interior edges i j with their opposite corners p (in the first triangle) and q."""
 
-    i: Faces
-    j: Faces
-    p: Faces
-    q: Faces
-    face: Faces
+    i: Indices
+    j: Indices
+    p: Indices
+    q: Indices
+    face: Indices
 
     def weight(self, V: Real) -> Real:
         """Return cotangent sums, negative if the edge is not Delaunay."""
@@ -252,14 +250,14 @@ class Quads:
         return Quads(self.i[k], self.j[k], self.p[k], self.q[k], self.face[k])
 
 
-def quads_of(F: Faces, edges: Edges) -> Quads:
+def quads_of(F: Indices, edges: Edges) -> Quads:
     """Return the two triangles at every interior edge."""
     inner = ~edges.on_boundary
     (i, j), face, corner = edges.ends[inner].T, edges.face[inner], edges.corner[inner]
     return Quads(i, j, F[face[:, 0], corner[:, 0]], F[face[:, 1], corner[:, 1]], face)
 
 
-def flip(F: Faces, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[Faces, Faces]:
+def flip(F: Indices, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[Indices, Indices]:
     """Flip an independent set of edges, highest priority first; also return the changed triangles.
 
     An edge stays if its other diagonal already is an edge.
@@ -283,7 +281,7 @@ def flip(F: Faces, quads: Quads, priority: Real, edges: Edges, n: int) -> tuple[
     return F, quads.face.ravel()
 
 
-def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
+def delaunay_flips(V: Real, F: Indices, rounds: int = 40) -> Indices:
     """Flip edges until (nearly) all are Delaunay: no cotangent weight is negative.
 
     An edge stays if its flip would fold the surface or duplicate an edge.
@@ -316,7 +314,7 @@ def delaunay_flips(V: Real, F: Faces, rounds: int = 40) -> Faces:
     return F
 
 
-def subdivide(V: Real, F: Faces) -> tuple[Real, Faces]:
+def subdivide(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Divide every triangle into four at the midpoints of its edges."""
     edges = edges_of(F, len(V))
     at = np.empty(F.shape, dtype=np.int64)  # the midpoint opposite to each corner

@@ -17,15 +17,15 @@ from typing import TypeVar
 import numpy as np
 import scipy
 
+from cembench.core.arrays import Indices, Real
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra, missing, require
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-from .implicit import Body, Field, Real, evaluate, gradient, to_curve, to_surface
+from .implicit import Body, Field, evaluate, gradient, to_curve, to_surface
 from .local_operations import (
-    Faces,
     area_vectors,
     boundary_mask,
     collapse,
@@ -100,7 +100,7 @@ def sample(body: Body) -> tuple[Real, Real, float]:
     return values, lower, spacing
 
 
-def march(body: Body) -> tuple[Real, Faces, Body, float]:
+def march(body: Body) -> tuple[Real, Indices, Body, float]:
     """Return the surface f = 0 by marching cubes, oriented outwards, cut where ``keep = 0``.
 
     Tunnels a few cells wide are plugged. Also returns the body with its plugs, and the grid
@@ -140,7 +140,7 @@ def _remove_strays(values: Real, spacing: float) -> None:
             values[stray] = 0.5 * spacing if inside else -0.5 * spacing
 
 
-def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Faces]:
+def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple[Real, Indices]:
     """Return the surface of sampled values by marching cubes, cut by the body's `keep`."""
     from skimage.measure import marching_cubes
 
@@ -156,8 +156,8 @@ def _cut_surface(body: Body, values: Real, lower: Real, spacing: float) -> tuple
 
 
 def cut(
-    V: Real, F: Faces, keep: Field, settle: Callable[[Real], Real], spacing: float
-) -> tuple[Real, Faces]:
+    V: Real, F: Indices, keep: Field, settle: Callable[[Real], Real], spacing: float
+) -> tuple[Real, Indices]:
     """Return the part of the mesh with ``keep >= 0``, with boundary vertices on ``keep = 0``.
 
     Vertices close to the cut are first moved onto it by `settle`, to avoid slivers.
@@ -183,7 +183,7 @@ def cut(
     key = key[order]
     new = ((1 - t) * V[crossing[:, 0]] + t * V[crossing[:, 1]])[order]
 
-    def between(a: Faces, b: Faces) -> Faces:
+    def between(a: Indices, b: Indices) -> Indices:
         return len(V) + np.searchsorted(key, np.minimum(a, b) * len(V) + np.maximum(a, b))
 
     for c in range(3):
@@ -204,7 +204,7 @@ def cut(
     return largest_piece(V, F)
 
 
-def largest_piece(V: Real, F: Faces) -> tuple[Real, Faces]:
+def largest_piece(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Return the connected component with the most vertices."""
     count, label = topology.components(F, len(V))
     if count > 1:
@@ -226,7 +226,7 @@ class Shape:
         """Return points of the boundary curve near p."""
         return to_curve(self.body.f, self.body.keep, p, self.step, reach)
 
-    def project(self, V: Real, F: Faces, reach: float, rounds: int = 3) -> Real:
+    def project(self, V: Real, F: Indices, reach: float, rounds: int = 3) -> Real:
         """Return all vertices projected back, none moving by more than `reach` per round."""
         rim = boundary_mask(F, len(V))
         V = V.copy()
@@ -240,7 +240,7 @@ def edge_length(area: float, faces: int) -> float:
     return float(np.sqrt(4 * area / (np.sqrt(3) * faces)))
 
 
-def relax(V: Real, F: Faces, shape: Shape, reach: float, strength: float = 0.6) -> Real:
+def relax(V: Real, F: Indices, shape: Shape, reach: float, strength: float = 0.6) -> Real:
     """Even out the vertices along the surface, and boundary vertices along the boundary."""
     n = len(V)
     edges = edges_of(F, n)
@@ -260,7 +260,7 @@ def relax(V: Real, F: Faces, shape: Shape, reach: float, strength: float = 0.6) 
 class Sizes:
     """Target edge length: `inside` far from the boundary, `rim` on it, graded between them."""
 
-    def __init__(self, V: Real, F: Faces, inside: float, rim: float) -> None:
+    def __init__(self, V: Real, F: Indices, inside: float, rim: float) -> None:
         self.inside, self.rim = inside, rim
         self._tree = scipy.spatial.cKDTree(V[boundary_mask(F, len(V))])
         # The length changes by at most a quarter of the distance.
@@ -272,7 +272,7 @@ class Sizes:
         return self.inside + (self.rim - self.inside) * np.exp(-d / self._reach)
 
 
-def resize(V: Real, F: Faces, shape: Shape, sizes: Sizes) -> tuple[Real, Faces]:
+def resize(V: Real, F: Indices, shape: Shape, sizes: Sizes) -> tuple[Real, Indices]:
     """Do one round of splits, collapses, flips and relaxation towards the target lengths."""
     for _ in range(3):
         edges = edges_of(F, len(V))
@@ -294,22 +294,22 @@ def resize(V: Real, F: Faces, shape: Shape, sizes: Sizes) -> tuple[Real, Faces]:
     return V, delaunay_flips(V, F)
 
 
-def _length(V: Real, ends: Faces) -> Real:
+def _length(V: Real, ends: Indices) -> Real:
     return np.linalg.norm(V[ends[:, 0]] - V[ends[:, 1]], axis=1)
 
 
-def perimeter(V: Real, F: Faces) -> float:
+def perimeter(V: Real, F: Indices) -> float:
     """Return the length of the boundary."""
     edges = edges_of(F, len(V))
     return float(_length(V, edges.ends[edges.on_boundary]).sum())
 
 
-def area(V: Real, F: Faces) -> float:
+def area(V: Real, F: Indices) -> float:
     """Return the area of the surface."""
     return 0.5 * float(np.linalg.norm(area_vectors(V, F), axis=1).sum())
 
 
-def to_boundary_count(V: Real, F: Faces, boundary: int, shape: Shape) -> tuple[Real, Faces]:
+def to_boundary_count(V: Real, F: Indices, boundary: int, shape: Shape) -> tuple[Real, Indices]:
     """Split the longest or collapse the shortest boundary edges until there are `boundary`."""
     for _ in range(60):
         edges = edges_of(F, len(V))
@@ -331,8 +331,8 @@ def to_boundary_count(V: Real, F: Faces, boundary: int, shape: Shape) -> tuple[R
 
 
 def to_face_count(
-    V: Real, F: Faces, faces: int, shape: Shape, sizes: Sizes | None = None
-) -> tuple[Real, Faces]:
+    V: Real, F: Indices, faces: int, shape: Shape, sizes: Sizes | None = None
+) -> tuple[Real, Indices]:
     """Split or collapse interior edges until there are `faces` triangles, or one more.
 
     The boundary is unchanged.
@@ -358,7 +358,7 @@ def to_face_count(
     return V, F
 
 
-def split_chords(V: Real, F: Faces) -> tuple[Real, Faces]:
+def split_chords(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Split interior edges between two boundary vertices, which violate Definition 1."""
     for _ in range(5):
         edges = edges_of(F, len(V))
@@ -370,7 +370,7 @@ def split_chords(V: Real, F: Faces) -> tuple[Real, Faces]:
     return V, F
 
 
-def split_stuck(V: Real, F: Faces, rounds: int = 20) -> tuple[Real, Faces]:
+def split_stuck(V: Real, F: Indices, rounds: int = 20) -> tuple[Real, Indices]:
     """Split the few non-Delaunay edges that cannot be flipped: creases, duplicate diagonals.
 
     Halving an edge makes its opposite angles smaller, at the cost of two triangles. Without such
@@ -387,7 +387,7 @@ def split_stuck(V: Real, F: Faces, rounds: int = 20) -> tuple[Real, Faces]:
     return V, F
 
 
-def flip_ears(F: Faces, n: int) -> Faces:
+def flip_ears(F: Indices, n: int) -> Indices:
     """Give every boundary vertex an interior neighbour by flipping the edge that cuts it off."""
     edges = edges_of(F, n)
     rim = np.bincount(edges.face[edges.on_boundary, 0], minlength=len(F))
@@ -401,7 +401,7 @@ def flip_ears(F: Faces, n: int) -> Faces:
 # ---- the whole ------------------------------------------------------------------------------
 
 
-def pymeshlab_remesh(V: Real, F: Faces, length: float, rounds: int = 6) -> tuple[Real, Faces]:
+def pymeshlab_remesh(V: Real, F: Indices, length: float, rounds: int = 6) -> tuple[Real, Indices]:
     """Return an isotropic explicit remesh with this edge length, by pymeshlab."""
     import pymeshlab
 
@@ -416,8 +416,8 @@ def pymeshlab_remesh(V: Real, F: Faces, length: float, rounds: int = 6) -> tuple
 
 
 def remesh(
-    V: Real, F: Faces, faces: int, boundary: int, shape: Shape, use_pymeshlab: bool
-) -> tuple[Real, Faces]:
+    V: Real, F: Indices, faces: int, boundary: int, shape: Shape, use_pymeshlab: bool
+) -> tuple[Real, Indices]:
     """Return a mesh of the same surface with these counts, as even inside as they allow."""
     target = edge_length(area(V, F), faces)
     if use_pymeshlab:
@@ -491,7 +491,7 @@ def mesh_of(
         ) from error
 
 
-def break_delaunay(V: Real, F: Faces, seed: int, share: float) -> Faces:
+def break_delaunay(V: Real, F: Indices, seed: int, share: float) -> Indices:
     """Flip edges, chosen by `seed`, until about `share` of the interior ones are not Delaunay.
 
     Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to slightly more

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from cembench.api.surface_collections import Provided, first, provided
+from cembench.api.surface_collections import Provided, provided
 from cembench.core.errors import MeshError, ParameterError
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Registry
@@ -91,7 +92,7 @@ def surfaces_of_thingi10k(
             f"thingi10k cannot fetch its models: {type(error).__name__}: {error}. Check the "
             "network, or name a folder that holds them with cache_dir."
         ) from error
-    for entry in first(entries, limit):
+    for entry in islice(entries, limit):
         name = f"thingi-{entry['file_id']}"
         place = entry["file_path"]
 

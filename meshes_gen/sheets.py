@@ -13,6 +13,7 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import MOST_FACES, surface_family
@@ -21,7 +22,6 @@ from .levers import with_levers
 from .rectangle import rectangle_grid, rectangle_to_disk
 
 Faces = Annotated[int, Field(ge=24, le=MOST_FACES)]
-Complex = NDArray[np.complex128]
 
 
 @surface_family("cylinder-sheet", title="Cylinder sheet", source="closed form")

@@ -4,21 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from cembench.core.arrays import Real
+
 from .head import NEUTRAL, Head, Person
-from .implicit import (
-    Body,
-    Noise,
-    Real,
-    box,
-    cone,
-    ellipsoid,
-    halfspace,
-    join,
-    meet,
-    ring,
-    sphere,
-    tube,
-)
+from .implicit import Body, Noise, box, cone, ellipsoid, halfspace, join, meet, ring, sphere, tube
 
 
 def _placed(head: Head, p: Real, at: tuple[float, float, float], scale: float) -> Real:

@@ -14,10 +14,9 @@ import scipy
 from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
-
-Complex = NDArray[np.complex128]
 
 #: Number of corners of the plan besides the ends of breaklines; share of it in which points lie.
 CORNERS, INSIDE = 5, 0.98

@@ -12,8 +12,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from .implicit import Field, Real, join
-from .local_operations import Faces, edges_of
+from cembench.core.arrays import Indices, Real
+
+from .implicit import Field, join
+from .local_operations import edges_of
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,7 @@ def plugged(f: Field, plugs: tuple[Plug, ...]) -> Field:
     return g
 
 
-def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
+def tunnels(V: Real, F: Indices, root: int | None = None) -> list[Indices]:
     """Return loops that generate the homology that a disk would not have, shortest first.
 
     They are short as seen from the vertex `root` (default: the highest).
@@ -79,7 +81,7 @@ def tunnels(V: Real, F: Faces, root: int | None = None) -> list[Faces]:
     return sorted((loop for loop in loops if len(loop)), key=len)
 
 
-def _loop(before: NDArray[np.int32], u: int, v: int) -> Faces:
+def _loop(before: NDArray[np.int32], u: int, v: int) -> Indices:
     """Return the edge u v with the tree paths from its ends to where they meet, as vertices."""
     paths = []
     for k in (u, v):
@@ -90,7 +92,7 @@ def _loop(before: NDArray[np.int32], u: int, v: int) -> Faces:
     return np.array(sorted(set(paths[0]) ^ set(paths[1])), dtype=np.int64)
 
 
-def plugs_for(V: Real, F: Faces, spacing: float, largest: float) -> tuple[Plug, ...]:
+def plugs_for(V: Real, F: Indices, spacing: float, largest: float) -> tuple[Plug, ...]:
     """Return balls for the tunnels no wider than `largest`, on a surface sampled at `spacing`."""
     loops = tunnels(V, F)
     plugs = _plugs(V, loops, spacing, largest)
@@ -103,7 +105,7 @@ def plugs_for(V: Real, F: Faces, spacing: float, largest: float) -> tuple[Plug, 
     return plugs
 
 
-def _plugs(V: Real, loops: list[Faces], spacing: float, largest: float) -> tuple[Plug, ...]:
+def _plugs(V: Real, loops: list[Indices], spacing: float, largest: float) -> tuple[Plug, ...]:
     """Return balls that close narrow loops and do not touch each other."""
     plugs: list[Plug] = []
     for loop in loops:

@@ -6,7 +6,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from .implicit import Body, Noise, Real, box, carve, halfspace, join, meet, ring
+from cembench.core.arrays import Real
+
+from .implicit import Body, Noise, box, carve, halfspace, join, meet, ring
 
 
 def revolve(p: Real, profile: NDArray[np.float64]) -> Real:

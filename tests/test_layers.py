@@ -78,8 +78,8 @@ BUDGETS = {
     "report": 8_470,
     "validation": 2_520,
     "morphing": 1_350,
-    "api": 5_450,
-    "commands": 3_100,
+    "api": 5_400,
+    "commands": 3_040,
 }
 
 

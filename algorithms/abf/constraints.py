@@ -11,14 +11,12 @@ from numpy.typing import NDArray
 from cembench.conformal.free_boundary import pinned_map, two_distant_vertices, with_area_pi
 from cembench.conformal.laplacian import laplacian_of_weights
 from cembench.conformal.metrics import corner_angles
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
-
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 class Angles:

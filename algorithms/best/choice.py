@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.angle_gauge import EQUAL
 from cembench.conformal.metrics import MapFigures, flipped_triangles
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import texel_density_ratio
+from cembench.core.arrays import Complex
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-Complex = NDArray[np.complex128]
 M = TypeVar("M", bound=TriangleMesh)
 
 #: A mean angle error, in degrees, above which a later tier may be better.

@@ -6,12 +6,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Annotated, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.planar import bounds_once
+from cembench.core.arrays import Complex
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 from cembench.registry import algorithm
@@ -24,7 +23,6 @@ from ..lscm import least_energy, lscm
 from ..scp import scp
 from .choice import Candidate, best_of
 
-Complex = NDArray[np.complex128]
 M = TypeVar("M", DiskMesh, HoledMesh)
 
 #: Repair is tried if at most this share of the triangles fold: it is slow, and hopeless with more.

@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from cembench.conformal.boundary_curve import closed_curve
 from cembench.conformal.free_boundary import is_strip, unrolled, with_area_pi
+from cembench.core.arrays import Real
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
 from .yamabe import YamabeBoundary
-
-Real = NDArray[np.float64]
 
 
 def _check_number_of_corners(corners: int) -> int:

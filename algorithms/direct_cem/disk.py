@@ -7,7 +7,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.bordered import BorderedLaplacian
@@ -24,13 +23,12 @@ from cembench.conformal.interior_laplacian import InteriorLaplacian, solves_pay
 from cembench.conformal.laplacian import delaunay_laplacian, laplacian
 from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.quasi_newton import quasi_newton_minimum
+from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
-Real = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 #: The start and its name, the minimum, and the map for given boundary values.
 _Minimised = tuple[CircleDomain, str, Minimum, Callable[[Complex], Complex]]
 

@@ -7,7 +7,6 @@ from contextlib import suppress
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from cembench.conformal.annulus import annulus_map
@@ -19,7 +18,7 @@ from cembench.conformal.gauge import Gauge, gauge_measure
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import SampledAngleError, dirichlet_energy, image_area
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Loop
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
@@ -28,8 +27,6 @@ from cembench.registry import algorithm
 
 from .gauge_walk import STEPS, gauge_walk
 from .opened import valid_with_holes
-
-Loop = NDArray[np.int64]
 
 #: Largest relative increase of E_C for giving crowded arcs the proportions of the start.
 MOST_COST = 0.01

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.fold_repair import accepted_repair, figures
 from cembench.conformal.folds import interior_without_folds
@@ -24,14 +23,12 @@ from cembench.conformal.metrics import (
 )
 from cembench.conformal.patches import filled
 from cembench.conformal.planar import crossing_polygons, fitted_circle, folded_triangles
+from cembench.core.arrays import Complex, Loop
 from cembench.core.clock import phase
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import HoledMesh
 
 from .disk import direct_cem
-
-Complex = NDArray[np.complex128]
-Loop = NDArray[np.int64]
 
 #: Radii of the circles that are tried, as shares of the largest about the centre in the polygon;
 #: with 0 the polygon stays.

@@ -24,14 +24,12 @@ from cembench.conformal.folds import in_order
 from cembench.conformal.laplacian import cotangent_laplacian, laplacian
 from cembench.conformal.patches import disk_patch, fan_patch
 from cembench.conformal.planar import backward_arcs, fitted_circle, polygon_area
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Loop, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import MapStep
 from cembench.linear_algebra.dense_cholesky import DenseCholesky
 from cembench.mesh.triangle_mesh import HoledMesh
-
-Loop = NDArray[np.int64]
 
 #: How holes are filled: by round disks, or by the paper's fans to the centroid.
 Patches: TypeAlias = Literal["disks", "fans"]

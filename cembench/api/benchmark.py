@@ -42,16 +42,8 @@ if TYPE_CHECKING:
     from cembench.running.watcher import Watcher
 
 #: Columns of :meth:`Run.table`, under the headings that they have on a terminal; 80 columns wide.
-FEW = {
-    "surface": "surface",
-    "algorithm": "algorithm",
-    "solves": "solves",
-    "status": "status",
-    "seconds": "seconds",
-    "comparable_energy": "E_C",
-    "angle_error_mean_deg": "angle°",
-    "flipped_triangles": "folds",
-}
+FEW = {name: name for name in ("surface", "algorithm", "solves", "status", "seconds")}
+FEW |= {"comparable_energy": "E_C", "angle_error_mean_deg": "angle°", "flipped_triangles": "folds"}
 
 
 @dataclass(frozen=True)
@@ -452,47 +444,46 @@ def benchmark(
     if output is not None:
         run_folder.check(Path(output))
     check_cluster(cluster, pairing, reporter)
-    if same_environment and cluster is None:
-        raise ParameterError.about("{same_environment} is of {cluster}: name one, or leave it out.")
-    if rounds is not None and precision is not None:
-        raise ParameterError.about(
-            "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of "
-            "them."
-        )
-    if rounds is not None and budget not in ("auto", None):
-        raise ParameterError.about(
-            "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one "
-            "of them. {precision} and {max_rounds} choose the rounds within a budget."
-        )
-    if rounds is not None and max_rounds != USUAL_MOST_ROUNDS:
-        raise ParameterError.about(
-            "{rounds} fixes the number of rounds, which {max_rounds} limits for {precision}: give "
-            "only one of them."
-        )
+    fixed, chosen_budget = rounds is not None, budget not in ("auto", None)
+    excluding = {
+        "{same_environment} is of {cluster}: name one, or leave it out.": (
+            same_environment and cluster is None
+        ),
+        "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of them.": (
+            fixed and precision is not None
+        ),
+        "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one of "
+        "them. {precision} and {max_rounds} choose the rounds within a budget.": (
+            fixed and chosen_budget
+        ),
+        "{rounds} fixes the number of rounds, which {max_rounds} limits for {precision}: give only "
+        "one of them.": fixed and max_rounds != USUAL_MOST_ROUNDS,
+        "{limit} needs {sets}: add one, or leave {limit} out.": limit is not None and not sets,
+        "{repair} works with single files and with {mesh_dir}: repair the files of a set one by "
+        "one, or leave it out.": repair and bool(sets),
+    }
+    for text, is_so in excluding.items():
+        if is_so:
+            raise ParameterError.about(text)
     if sets and rounds is None and precision is None:
         rounds = 1
     share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)
+    of_machines = cluster is not None and memory_bytes is None
+    memory = None if of_machines else bytes_of(memory_bytes)
+    usual = usual_budget(models) if budget == "auto" else None
     options = Options(
-        timeout,
-        None if cluster is not None and memory_bytes is None else bytes_of(memory_bytes),
-        fresh,
-        rerun_failed,
-        seed,
+        *(timeout, memory, fresh, rerun_failed, seed),
         reference=reference or REFERENCE,
         most_rounds=max_rounds,
-        budget=usual_budget(models)
-        if budget == "auto"
-        else None
-        if budget is None
-        else budget_seconds(budget),
+        budget=budget_seconds(budget) if budget is not None and budget != "auto" else usual,
         pairing=pairing,
         repeat_busy=repeat_busy,
         jobs=jobs or (usable_cores() if sets else 1),
     )
     library = installed_backend(backend)
     registry = registry_with(plugins, reporter)
-    usual = algorithms_of(models, registry) if models else registry.usual_algorithms
-    chosen = chosen_algorithms(registry, algorithms, usual)
+    by_default = algorithms_of(models, registry) if models else registry.usual_algorithms
+    chosen = chosen_algorithms(registry, algorithms, by_default)
     check_reference(reference, chosen)
     for algorithm in chosen:
         if why := missing(algorithm):
@@ -507,13 +498,6 @@ def benchmark(
                 "`cembench.list_surfaces()` and `cembench.fetch()`",
                 "`cembench list surfaces` and `cembench fetch`",
             ),
-        )
-    if limit is not None and not sets:
-        raise ParameterError.about("{limit} needs {sets}: add one, or leave {limit} out.")
-    if repair and sets:
-        raise ParameterError.about(
-            "{repair} works with single files and with {mesh_dir}: repair the files of a set one "
-            "by one, or leave it out."
         )
     kept = [name for name in of_profile if registry.surface(name).kept]
     new = [name for name in kept if not is_kept(registry.surface(name))]

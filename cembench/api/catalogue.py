@@ -72,14 +72,10 @@ class Catalogue:
 
 
 def _about(registered: Algorithm | Surface, **more: Any) -> dict[str, Any]:
-    return {
-        "name": registered.name,
-        "title": registered.title,
-        "source": registered.source,
-        "parameters": {p.name: p.default for p in registered.parameters},
-        "notes": registered.notes,
-        "origin": registered.origin,
-    } | more
+    parameters = {p.name: p.default for p in registered.parameters}
+    texts = {name: getattr(registered, name) for name in ("name", "title", "source")}
+    notes = {"notes": registered.notes, "origin": registered.origin}
+    return {**texts, "parameters": parameters, **notes, **more}
 
 
 def _plain(facts: SurfaceFacts | None) -> dict[str, Any] | None:
@@ -159,13 +155,11 @@ def catalogue(
             with reporter.busy(f"[{k}/{len(todo)}] {family.name}: making, mapping, drawing"):
                 facts[family.name] = find_facts(registry, family)
             reporter.info(f"[{k}/{len(todo)}] {family.name}")
+    algorithms = tuple(a for a in registry.algorithms.values() if target in (None, a.target))
     return Catalogue(
-        None
-        if kind == "surfaces"
-        else tuple(a for a in registry.algorithms.values() if target in (None, a.target)),
+        None if kind == "surfaces" else algorithms,
         None if kind == "algorithms" else tuple(registry.surfaces.values()),
-        tuple(registry.peers),
-        facts,
+        *(tuple(registry.peers), facts),
     )
 
 

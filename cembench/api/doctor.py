@@ -18,13 +18,9 @@ from cembench.mesh.datasets import cache_directory, is_fetched
 from cembench.registry import load_registry
 from cembench.running.environment import describe_environment
 
-_REQUIRED = {
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "libigl": "igl",
-    "matplotlib": "matplotlib",
-    "pandas": "pandas",
-}
+#: The modules of packages that are called otherwise.
+_MODULES = {"libigl": "igl"}
+_REQUIRED = ("numpy", "scipy", "libigl", "matplotlib", "pandas")
 #: Purpose of each extra.
 _FOR = {
     Extra.CLUSTER: "measures on several machines",
@@ -60,7 +56,7 @@ def examine() -> list[InstallationFinding]:
     """Check the interpreter, the libraries, the back ends, the plug-ins and the machine."""
     return [
         _python(),
-        *(_library(package, module) for package, module in _REQUIRED.items()),
+        *map(_library, _REQUIRED),
         _backends(),
         _plugins(),
         *(_offered(entry) for entry in sorted(entry_points(group=CHECKS), key=lambda e: e.name)),
@@ -71,20 +67,17 @@ def examine() -> list[InstallationFinding]:
 
 
 def _python() -> InstallationFinding:
-    ok = sys.version_info >= (3, 11)
-    return InstallationFinding(
-        "python", ok, sys.version.split()[0], remedy="Install Python 3.11 or newer."
-    )
+    ok, remedy = sys.version_info >= (3, 11), "Install Python 3.11 or newer."
+    return InstallationFinding("python", ok, sys.version.split()[0], remedy=remedy)
 
 
-def _library(package: str, module: str) -> InstallationFinding:
+def _library(package: str) -> InstallationFinding:
     try:
-        importlib.import_module(module)
+        importlib.import_module(_MODULES.get(package, package))
         return InstallationFinding(package, True, version(package))
     except ImportError as error:
-        return InstallationFinding(
-            package, False, str(error), remedy=f"Run `pip install {package}`."
-        )
+        remedy = f"Run `pip install {package}`."
+        return InstallationFinding(package, False, str(error), remedy=remedy)
 
 
 def _backends() -> InstallationFinding:
@@ -104,9 +97,8 @@ def _plugins() -> InstallationFinding:
     except CembenchError as error:
         return InstallationFinding("plug-ins", False, str(error), remedy="See the message.")
     detail = f"{len(registry.algorithms)} algorithms, {len(registry.surfaces)} surfaces"
-    return InstallationFinding(
-        "plug-ins", bool(registry.algorithms), detail, remedy="Reinstall cembench."
-    )
+    held = bool(registry.algorithms)
+    return InstallationFinding("plug-ins", held, detail, remedy="Reinstall cembench.")
 
 
 def _offered(entry: EntryPoint) -> InstallationFinding:
@@ -130,19 +122,15 @@ def _datasets() -> list[InstallationFinding]:
     detail = f"{len(fetched)} of {len(known)} fetched{': ' if fetched else ''}{', '.join(fetched)}"
     detail += f"; kept in {cache_directory()}"
     remedy = "Run `cembench fetch NAME` for the paper's public models; stand-ins need no download."
-    return [
-        InstallationFinding(
-            "datasets", len(fetched) == len(known), detail, required=False, remedy=remedy
-        )
-    ]
+    all_here = len(fetched) == len(known)
+    return [InstallationFinding("datasets", all_here, detail, required=False, remedy=remedy)]
 
 
 def _extra(extra: Extra) -> InstallationFinding:
     absent = missing(extra)
     detail = _FOR[extra] + (f"; {', '.join(absent)} missing" if absent else "")
-    return InstallationFinding(
-        f"[{extra}]", not absent, detail, required=False, remedy=f"Run `{command(extra)}`."
-    )
+    remedy = f"Run `{command(extra)}`."
+    return InstallationFinding(f"[{extra}]", not absent, detail, required=False, remedy=remedy)
 
 
 def _machine() -> InstallationFinding:

@@ -121,20 +121,12 @@ def fetch(
     missing = {one.path: one for one in wanted if not is_fetched(one)}
     if len(wanted) > 1:
         reporter.info(_intent(len({one.path for one in wanted}), list(missing.values())))
-    failed: dict[str, CembenchError] = {}
+    limits: dict[str, Any] = {"jobs": jobs, "timeout": timeout, "have": list(map(Path, have))}
     with (
         reporter.downloads(list(missing.values())) as progress,
-        closing(
-            fetch_all(
-                *(wanted,),
-                jobs=jobs,
-                timeout=timeout,
-                have=[Path(folder) for folder in have],
-                progress=progress,
-            )
-        ) as downloads,
+        closing(fetch_all(wanted, **limits, progress=progress)) as downloads,
     ):
-        failed |= {one.dataset.name: one.error for one in downloads if one.error is not None}
+        failed = {one.dataset.name: one.error for one in downloads if one.error is not None}
     if len(wanted) > 1:
         again = f", {len(failed)} failed; the same call tries them again" * bool(failed)
         reporter.info(f"{len(wanted) - len(failed)} of {len(wanted)} fetched{again}.")
@@ -157,18 +149,11 @@ def about(dataset: Dataset) -> dict[str, Any]:
     """Return what is known of a public surface as plain data."""
     from cembench.mesh.datasets import is_fetched
 
+    texts = ("name", "title", "paper_row", "group")
+    facts = ("faces", "licence", "fetch_only", "note", "url", "sha256")
+    size = dataset.path.stat().st_size if dataset.path.is_file() else dataset.size
     return {
-        "name": dataset.name,
-        "title": dataset.title,
-        "paper_row": dataset.paper_row or None,
-        "group": dataset.group or None,
-        "faces": dataset.faces,
-        "licence": dataset.licence,
-        "fetch_only": dataset.fetch_only,
-        "note": dataset.note or None,
-        "url": dataset.url,
-        "sha256": dataset.sha256,
-        "size": dataset.path.stat().st_size if dataset.path.is_file() else dataset.size,
-        "fetched": is_fetched(dataset),
-        "path": str(dataset.path),
+        **{name: getattr(dataset, name) or None for name in texts},
+        **{name: None if (one := getattr(dataset, name)) == "" else one for name in facts},
+        **{"size": size, "fetched": is_fetched(dataset), "path": str(dataset.path)},
     }

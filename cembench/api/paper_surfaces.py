@@ -60,9 +60,7 @@ def fetch_models(
 
 
 def _fetch(
-    missing: Sequence[Dataset],
-    progress: Callable[[Dataset], Progress | None],
-    seconds: float,
+    missing: Sequence[Dataset], progress: Callable[[Dataset], Progress | None], seconds: float
 ) -> str:
     """Fetch all at once, so that the limit is that of all; return why the first failed, if any."""
     try:

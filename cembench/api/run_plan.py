@@ -23,13 +23,7 @@ from cembench.running.estimate import Estimate, estimate, planned_seconds
 from cembench.running.external.installed import missing
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import (
-    Provenance,
-    Task,
-    mesh_files,
-    provenance_of,
-    provenances,
-)
+from cembench.running.plan import Provenance, Task, mesh_files, provenance_of, provenances
 from cembench.running.surfaces import (
     generate_surface,
     is_generated,
@@ -282,10 +276,7 @@ def plan_summary(plan: Plan) -> dict[str, Any]:
     held, lacking, costs = plan.held(), plan.lacking(), plan.costs()
     cells = [
         {
-            "key": task.cell.key,
-            "mesh": task.cell.mesh,
-            "algorithm": task.cell.algorithm,
-            "solves": task.cell.solves,
+            **{name: getattr(task.cell, name) for name in ("key", "mesh", "algorithm", "solves")},
             "faces": task.facts.faces,
             "held": held.get(task.cell.key),
             "lacks": lacking.get(task.algorithm.name),

@@ -14,6 +14,7 @@ from functools import partial
 from importlib.metadata import entry_points
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 from cembench.api.surface_collections import (
     Names,
@@ -60,11 +61,7 @@ SETS = "cembench.sets"
 
 
 def surfaces_of_set(
-    name: str,
-    registry: Registry,
-    *,
-    limit: int | None = None,
-    progress: ShowProgress = _quietly,
+    name: str, registry: Registry, *, limit: int | None = None, progress: ShowProgress = _quietly
 ) -> Iterator[Provided]:
     """Yield the surfaces of a set, ready to be mapped, each with its name and source.
 
@@ -200,31 +197,24 @@ def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibi
         f"mapped{f', {cut} after they were cut open' if cut else ''}. Success rates refer to "
         "those that can be mapped."
     )
-    tables = [
-        ExhibitTable(
-            title="Surfaces of this run",
-            columns=(
-                *("surface", "family", "vertices", "triangles", "boundaries", "from", "licence"),
-            ),
-            rows=tuple(
-                (
-                    *(
-                        one.name,
-                        collected.roles[one.name].family or one.name,
-                        one.mesh.n,
-                        one.mesh.m,
-                    ),
-                    *(len(one.mesh.loops), one.source, one.licence),
-                )
-                for one in collected.surfaces
-                if one.mesh is not None
-            ),
+    columns = ("surface", "family", "vertices", "triangles", "boundaries", "from", "licence")
+    roles = collected.roles
+    rows = tuple(
+        (
+            *(one.name, roles[one.name].family or one.name, one.mesh.n, one.mesh.m),
+            *(len(one.mesh.loops), one.source, one.licence),
         )
-    ]
+        for one in collected.surfaces
+        if one.mesh is not None
+    )
+    tables = [ExhibitTable(title="Surfaces of this run", columns=columns, rows=rows)]
     if collected.refused:
-        rows = tuple((one.name, one.error, one.source) for one in collected.refused)
-        columns = ("surface", "reason", "from")
-        tables.append(ExhibitTable(title="Not measured", columns=columns, rows=rows))
+        refused = tuple((one.name, one.error, one.source) for one in collected.refused)
+        why = ("surface", "reason", "from")
+        tables.append(ExhibitTable(title="Not measured", columns=why, rows=refused))
+    facts: dict[str, Any] = {"sets": list(sets), "given": count}
+    facts["measured"] = len(collected.surfaces)
+    facts["refused"] = {one.name: one.error for one in collected.refused}
     return Exhibit(
         name=EXHIBIT,
         title="The surfaces",
@@ -232,10 +222,5 @@ def exhibit_of(collected: Gathered, sets: Sequence[str], command: str) -> Exhibi
         command=command,
         origin="surface",
         tables=tuple(tables),
-        facts={
-            "sets": list(sets),
-            "given": count,
-            "measured": len(collected.surfaces),
-            "refused": {one.name: one.error for one in collected.refused},
-        },
+        facts=facts,
     )

@@ -15,12 +15,13 @@ import tarfile
 import tempfile
 import zipfile
 import zlib
-from collections.abc import Callable, Generator, Iterable, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import islice
 from pathlib import Path, PurePosixPath
-from typing import Any, BinaryIO, cast
+from typing import BinaryIO, cast
 
 from cembench.core.errors import CembenchError, ParameterError
 from cembench.mesh.cut import cut_open
@@ -105,7 +106,7 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
         raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
     files = (path for path in sorted(folder.rglob("*")) if is_named_like_a_mesh(path))
     names, manifest = Names(), read_manifest(folder)
-    for path in first(files, limit):
+    for path in islice(files, limit):
         inside = path.relative_to(folder).with_suffix("").as_posix()
         row = manifest.get(inside, {})
         name = names.of(row.get("name") or inside.replace("/", "-"))
@@ -173,7 +174,7 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
     with tempfile.TemporaryDirectory() as folder:
         try:
             with closing(_members(path)) as members:
-                for member in first(members, limit):
+                for member in islice(members, limit):
                     yield _unpacked(member, names, Path(folder), path)
         except (zipfile.BadZipFile, tarfile.TarError, EOFError, *_DAMAGED, OSError) as error:
             raise ParameterError(
@@ -213,14 +214,6 @@ class Names:
             unused = f"{name}-{number}"
         self.taken.add(unused)
         return unused
-
-
-def first(items: Iterable[Any], limit: int | None) -> Iterator[Any]:
-    """Yield the first items, or all without a limit."""
-    for count, item in enumerate(items):
-        if limit is not None and count >= limit:
-            return
-        yield item
 
 
 @dataclass(frozen=True)
@@ -299,10 +292,7 @@ def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Pro
                     if left < 0:
                         return Provided(name, source, error="it is larger than its declared size")
                     file.write(piece)
-        except (
-            RuntimeError,
-            NotImplementedError,
-        ) as error:  # encrypted, or an unsupported compression
+        except RuntimeError as error:  # encrypted, or an unsupported compression
             return Provided(name, source, error=f"it cannot be unpacked: {error}")
         file.flush()
         place = Path(file.name)

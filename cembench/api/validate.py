@@ -117,9 +117,7 @@ def validate(
     on = [*(surfaces_of(Profile(profile), registry) if profile else []), *surfaces]
     with reporter.busy("reading surfaces"):
         meshes, roles = read_surfaces(
-            *(on, map(Path, mesh_dir), registry, [algorithm], reporter),
-            faces=faces,
-            repair=False,
+            *(on, map(Path, mesh_dir), registry, [algorithm], reporter), faces=faces, repair=False
         )
     plan_cells([algorithm], meshes, {}, MeasurementSettings())  # fail now, not after the checks
     asked = ValidationOptions(

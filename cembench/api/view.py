@@ -15,10 +15,7 @@ from cembench.results.records import Outcome
 
 
 def map_page(
-    mesh: TriangleMesh,
-    z: NDArray[np.complex128],
-    outcome: Outcome,
-    algorithm: str,
+    mesh: TriangleMesh, z: NDArray[np.complex128], outcome: Outcome, algorithm: str
 ) -> str:
     """Return the page of a map: a 3-D view, a picture for browsers without WebGL, the figures.
 

@@ -114,14 +114,11 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
     if as_json:
         print_json(summary | ({"cluster": on_cluster} if on_cluster else {}))
         return
-    out.print(
-        plan_table(
-            [
-                (t.cell, t.facts.faces, c.basis if c else _not_run(about), c)
-                for t, c, about in zip(plan.tasks, costs, summary["cells"], strict=True)
-            ]
-        )
-    )
+    lines = [
+        (t.cell, t.facts.faces, c.basis if c else _not_run(about), c)
+        for t, c, about in zip(plan.tasks, costs, summary["cells"], strict=True)
+    ]
+    out.print(plan_table(lines))
     known = [cost for cost in costs if cost is not None]
     is_rough = any(cost.basis == "rough" for cost in known)
     rough = " (rough: few similar cells were measured here before)" if is_rough else ""

@@ -27,7 +27,6 @@ from cembench.core.errors import ParameterError
 from cembench.core.reporter import Reporter
 
 if TYPE_CHECKING:
-    from cembench.mesh.triangle_mesh import TriangleMesh
     from cembench.results.records import Record
 
 #: Control codes are replaced by visible symbols; tabs and line ends are kept.
@@ -122,13 +121,6 @@ def note(message: str, style: str = "yellow") -> None:
     """Print a remark on standard error."""
     if not out.quiet:
         err.print(f"note: {message}", style=style, soft_wrap=True)
-
-
-def print_notices(meshes: Iterable[TriangleMesh]) -> None:
-    """Print the notices of surfaces on standard error."""
-    for mesh in meshes:
-        for notice in mesh.notices:
-            note(f"{mesh.name}: {notice}")
 
 
 @contextmanager

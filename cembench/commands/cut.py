@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -50,8 +50,7 @@ def cut(
         bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
     ] = False,
     force: Annotated[
-        bool,
-        typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv."),
+        bool, typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv.")
     ] = False,
     as_json: Json = False,
 ) -> None:
@@ -66,8 +65,7 @@ def cut(
     if output.suffix.lower() == ".stl":
         raise MeshError(
             f"{output}: STL stores no connectivity, so the cut would be closed again; allowed "
-            "here: "
-            ".obj, .off, .ply."
+            "here: .obj, .off, .ply."
         )
     seam = output.with_name(f"{output.stem}_seam.csv")
     refuse_inputs(output, [mesh], force=force)
@@ -80,18 +78,10 @@ def cut(
     write_mesh(output, disk.mesh)
     write_numbers(seam, "vertex", disk.origin)
     if as_json:
-        about = {
-            "input": str(mesh),
-            "output": str(output),
-            "seam": str(seam),
-            "cut_edges": disk.edges.tolist(),
-            "cut_length": disk.length,
-            "vertices": disk.mesh.n,
-            "faces": disk.mesh.m,
-            "boundary_vertices": rim,
-        }
-        steps = {} if repaired is None else {"repair": repaired.steps}
-        print_json(about | steps)
+        about: dict[str, Any] = {"input": str(mesh), "output": str(output), "seam": str(seam)}
+        about |= {"cut_edges": disk.edges.tolist(), "cut_length": disk.length}
+        about |= {"vertices": disk.mesh.n, "faces": disk.mesh.m, "boundary_vertices": rim}
+        print_json(about if repaired is None else about | {"repair": repaired.steps})
         return
     for notice in disk.mesh.notices:
         if along or notice.kind is not NoticeKind.CUT_OPEN:  # printed below

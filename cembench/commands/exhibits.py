@@ -21,8 +21,7 @@ from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import DEFAULT_RUN, AddTo
 
 Surfaces = Annotated[
-    list[str],
-    typer.Argument(metavar="MESH", help="Mesh file, or a name from `list surfaces`."),
+    list[str], typer.Argument(metavar="MESH", help="Mesh file, or a name from `list surfaces`.")
 ]
 
 
@@ -40,11 +39,7 @@ def _add(entry: EntryPoint) -> None:
     )
     @from_api(function, without=("surface", "reporter"))
     def make(
-        call: Call,
-        surfaces: Surfaces = usual,
-        *,
-        run: AddTo = DEFAULT_RUN,
-        as_json: Json = False,
+        call: Call, surfaces: Surfaces = usual, *, run: AddTo = DEFAULT_RUN, as_json: Json = False
     ) -> None:
         """Add the exhibits of surfaces to a run, and print them."""
         from cembench.report.content.exhibits import tables_shown

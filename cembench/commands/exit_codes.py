@@ -174,19 +174,11 @@ def _advice(error: OSError) -> str:
 def _kept(trace: str) -> str:
     """Write a traceback to a file; return where it is, or how to show it."""
     if DEBUG not in os.environ:
-        with (
-            suppress(OSError),
-            tempfile.NamedTemporaryFile(
-                "w",
-                prefix="cembench-fault-",
-                suffix=".txt",
-                delete=False,
-                encoding="utf-8",
-                errors="backslashreplace",
-            ) as file,
-        ):
-            file.write(trace)
-            return f"the traceback in {file.name}."
+        with suppress(OSError):
+            handle, name = tempfile.mkstemp(".txt", "cembench-fault-")
+            with os.fdopen(handle, "wb") as file:
+                file.write(trace.encode(errors="backslashreplace"))
+            return f"the traceback in {name}."
     return f"the traceback that {DEBUG}=1 prints."
 
 

@@ -23,8 +23,7 @@ Surfaces = Annotated[
     typer.Option("--surfaces", metavar="NAME", help="Generated surfaces, comma-separated."),
 ]
 Verify = Annotated[
-    bool,
-    typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample."),
+    bool, typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample.")
 ]
 RequireSigned = Annotated[
     Path | None,

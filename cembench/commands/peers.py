@@ -9,15 +9,7 @@ from typing import TYPE_CHECKING
 from cembench.api.benchmark import benchmark
 from cembench.api.settings import registry_with
 from cembench.commands.app import app
-from cembench.commands.console import (
-    SHOWN,
-    Json,
-    fail,
-    failures,
-    out,
-    print_json,
-    split,
-)
+from cembench.commands.console import SHOWN, Json, fail, failures, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Meshes, OutputRun, Surfaces
@@ -26,15 +18,6 @@ if TYPE_CHECKING:
     from cembench.registry import Algorithm, Registry
     from cembench.results.records import Record
 
-#: Default surfaces.
-USUAL = (
-    "hemi-ellipsoid",
-    "catenoid-sheet",
-    "cylinder-sheet",
-    "cone",
-    "cowboy-hat-stand-in",
-    "nefertiti-stand-in",
-)
 #: Our algorithms for disks in the comparison; of other targets, all are included.
 DISKS = ("cem", "direct-cem", "harmonic-circle")
 
@@ -70,6 +53,7 @@ def peers(
     from cembench.results import run_folder
     from cembench.results.columns import rows
     from cembench.running.external.installed import missing
+    from cembench.validation.surfaces import USUAL_DISKS
 
     run_folder.check(output)
     folders.check(output / "report", "report")
@@ -82,7 +66,7 @@ def peers(
     chosen = wanted if asked else [*_usual(registry), *wanted]
     lacking = {a.name: why for a in chosen if (why := missing(a))}
     measured = call(
-        [*mesh, *(split(surfaces) or ([] if mesh or keywords["mesh_dir"] else USUAL))],
+        [*mesh, *(split(surfaces) or ([] if mesh or keywords["mesh_dir"] else USUAL_DISKS))],
         algorithms=[a.name for a in chosen if a.name not in lacking],
         plugins=plugins,
         pairing="separate",

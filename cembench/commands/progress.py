@@ -119,7 +119,7 @@ class PlainProgress(Watcher):
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Update the estimate of the time left, and print it after a minute without a line."""
-        self.remaining.ended(task.cell.label, rounds_left(step), seconds)
+        self.remaining.ended(task.cell.label, step.rounds - (step.round or 0), seconds)
         if monotonic() - self._said_at > self.EVERY:
             self._say_left(f"{self.remaining.done} of {self.remaining.processes} processes")
 
@@ -232,11 +232,6 @@ def progress_on(
     """Return the live table on a terminal, and one line per event elsewhere."""
     kind = LiveProgress if console.is_terminal else PlainOnCluster if on_cluster else PlainProgress
     return kind(console, cells, budget)
-
-
-def rounds_left(step: Step) -> int:
-    """Return the number of processes a cell needs after this step, as far as known."""
-    return step.rounds - (step.round or 0)
 
 
 def duration(seconds: float) -> str:

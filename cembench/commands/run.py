@@ -86,9 +86,8 @@ def _show_status(
     if about["superseded"]:
         out.print(f"{about['superseded']:>6}  older records of cells measured again")
     _show_machines(about["machines"])
-    for words in (about["stability"], about["scatter"]):
-        if words:
-            out.print(words)
+    for words in filter(None, (about["stability"], about["scatter"])):
+        out.print(words)
     for cell, state in cells:
         if state.name not in ("ok", "waiting"):
             line = f"{cell.mesh} / {cell.algorithm} ({cell.solves}): {state}"
@@ -178,9 +177,8 @@ def _show_records(records: list[Record]) -> None:
         for number, r in enumerate(outcome.rounds, start=1):
             calls = " ".join(significant(seconds, 4) for seconds in r.calls)
             out.print(f"round {number:<3} {r.started_at}  {calls}")
-        for words in (outcome.cause, outcome.traceback):
-            if words:
-                out.print(words, soft_wrap=True)
+        for words in filter(None, (outcome.cause, outcome.traceback)):
+            out.print(words, soft_wrap=True)
 
 
 Compared = Annotated[Path, typer.Argument(help="A run's folder, or a report's.")]
@@ -223,12 +221,9 @@ def compare(
         rows = [
             {
                 **{name: c.after[name] for name in ("mesh", "algorithm", "solves")},
-                "seconds_before": c.before["seconds"],
-                "seconds_after": c.after["seconds"],
+                **{"seconds_before": c.before["seconds"], "seconds_after": c.after["seconds"]},
                 **asdict(c.comparison),
-                "verdict_corrected": both.verdict,
-                "drift": c.drift,
-                "verdicts": c.verdicts,
+                **{"verdict_corrected": both.verdict, "drift": c.drift, "verdicts": c.verdicts},
             }
             for c, both in zip(changes, together, strict=True)
         ]

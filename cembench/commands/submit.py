@@ -17,7 +17,7 @@ from cembench.commands.options import RequireSigned
 from cembench.core.overwriting import refuse_inputs
 
 if TYPE_CHECKING:
-    from cembench.report.document import Table
+    from cembench.report.document import Plain, Table
     from cembench.results.bundle import Submission
 
 
@@ -72,32 +72,18 @@ def submissions(
 def _table(checked: Sequence[Submission]) -> Table:
     from cembench.report.document import Column, Table, words
 
-    return Table.of(
-        "submissions",
-        f"{sum(one.accepted for one in checked)} of {len(checked)} bundles accepted",
-        [
-            *(Column(title, numeric=False) for title in ("bundle", "found", "machines")),
-            *(Column(title, form=",d") for title in ("cells", "maps")),
-            Column("signed by", numeric=False),
-        ],
-        [
-            [
-                one.name,
-                words("accepted", "good") if one.accepted else words("refused", "bad"),
-                ", ".join(one.machines) or "-",
-                one.cells,
-                one.maps,
-                one.signer or "-",
-            ]
-            for one in checked
-        ],
-        notes=tuple(
-            f"{one.name}: {'; '.join(one.faults[:5])}"
-            + (f"; and {len(one.faults) - 5} more" if len(one.faults) > 5 else "")
-            for one in checked
-            if one.faults
-        ),
-    )
+    rows: list[list[Plain]] = []
+    notes: list[str] = []
+    for one in checked:
+        found = words("accepted", "good") if one.accepted else words("refused", "bad")
+        about = (one.name, found, ", ".join(one.machines) or "-")
+        rows.append([*about, one.cells, one.maps, one.signer or "-"])
+        more = f"; and {len(one.faults) - 5} more" if len(one.faults) > 5 else ""
+        notes += [f"{one.name}: {'; '.join(one.faults[:5])}{more}"] * bool(one.faults)
+    counts = (Column("cells", form=",d"), Column("maps", form=",d"))
+    title = f"{sum(one.accepted for one in checked)} of {len(checked)} bundles accepted"
+    columns = ("bundle", "found", "machines", *counts, "signed by")
+    return Table.of("submissions", title, columns, rows, notes=tuple(notes))
 
 
 @app.command(

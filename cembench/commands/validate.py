@@ -16,7 +16,7 @@ from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
-    from cembench.validation.verdict import Validation
+    pass
 
 
 @app.command(
@@ -24,11 +24,7 @@ if TYPE_CHECKING:
     "cembench validate mine.py:fast --against cem,fdm --profile quick -o results/mine  ·  "
     "cembench validate mine.py --require not-slower"
 )
-@from_api(
-    validate_solver,
-    without=("reporter",),
-    require="--require WHAT",
-)
+@from_api(validate_solver, without=("reporter",), require="--require WHAT")
 def validate(
     call: Call,
     plugin: Annotated[
@@ -66,7 +62,11 @@ def validate(
     folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
     if as_json:
-        print_json(_as_json(validation, written))
+        from cembench.validation.verdict import sentence
+
+        verdict: dict[str, Any] = {"valid": validation.valid, "passed": validation.passed}
+        verdict |= {"verdict": sentence(validation)}
+        print_json(verdict | validation.model_dump(mode="json") | written)
     else:
         from cembench.validation.document import validation_text
 
@@ -82,15 +82,3 @@ def validate(
             write_junit(validation, junit)
     if not validation.passed:
         raise typer.Exit(1)
-
-
-def _as_json(validation: Validation, written: dict[str, str]) -> dict[str, Any]:
-    """Return the validation as data for JSON output."""
-    from cembench.validation.verdict import sentence
-
-    verdict = {
-        "valid": validation.valid,
-        "passed": validation.passed,
-        "verdict": sentence(validation),
-    }
-    return verdict | validation.model_dump(mode="json") | written

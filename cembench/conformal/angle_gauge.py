@@ -69,17 +69,9 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
         tried.append((sampled(_moved(mesh, uv, move)), tuple(move.tolist())))
         return tried[-1][0]
 
-    minimize(
-        error_at,
-        np.zeros(2),
-        method="Nelder-Mead",
-        options={
-            "initial_simplex": FIRST_MOVE * np.eye(3)[:, 1:],
-            "xatol": LAST_MOVE,
-            "fatol": LEAST_CHANGE * sampled(uv),
-            "maxfev": MOST_MAPS,
-        },
-    )
+    ends = {"xatol": LAST_MOVE, "fatol": LEAST_CHANGE * sampled(uv), "maxfev": MOST_MAPS}
+    options = {"initial_simplex": FIRST_MOVE * np.eye(3)[:, 1:], **ends}
+    minimize(error_at, np.zeros(2), method="Nelder-Mead", options=options)
     areas, most = surface_areas(mesh), (1 + EQUAL) * min(tried)[0]
     moved = min(
         (_moved(mesh, uv, np.array(move)) for error, move in tried if error <= most),

@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 
 from cembench.conformal.conjugate_functions import ConjugateFunctions, conjugate_functions
 from cembench.conformal.folds import in_order
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Loop
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import HoledMesh
-
-Loop = NDArray[np.int64]
 
 #: Doubles hold the annulus with radii 1 and exp(-DEEPEST), and areas of triangles near the hole by
 #: exact arithmetic.

@@ -42,10 +42,7 @@ def pole(
 
 
 def pole_start(
-    V: Real,
-    F: NDArray[np.int64],
-    solve: Callable[[Complex], Complex],
-    triangle: int | None = None,
+    V: Real, F: NDArray[np.int64], solve: Callable[[Complex], Complex], triangle: int | None = None
 ) -> Complex:
     """Return the boundary values of the map with a pole in the middle (Eqs. 13, 14, 18).
 

@@ -12,17 +12,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import HarmonicExtension
 from cembench.conformal.laplacian import laplacian
-from cembench.core.arrays import Real
+from cembench.core.arrays import Loop, Real
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.cut import DiskCut, cut_open
 from cembench.mesh.triangle_mesh import HoledMesh
-
-Loop = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

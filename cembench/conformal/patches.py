@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
-from cembench.core.arrays import Real
+from cembench.core.arrays import Loop, Real
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-
-Loop = NDArray[np.int64]
 
 #: Height of a fan's triangle, as a share of its base, below which it has no area.
 SLIM = 1e-9

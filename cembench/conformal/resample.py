@@ -10,17 +10,15 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import special
 from scipy.spatial import Delaunay
 
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.errors import ParameterError
 from cembench.core.wording import Setting
 from cembench.mesh.defects import degenerate
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
-Ints = NDArray[np.int64]
 Grid = Literal["square", "disk"]
 
 #: Allowed numbers of samples along a side.
@@ -135,7 +133,9 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: int) -> tuple[DiskMesh,
     return DiskMesh.from_arrays(V, F, name=mesh.name), points
 
 
-def locate(z: Complex, F: Ints, points: Complex, *, nearest: bool = False) -> tuple[Ints, Real]:
+def locate(
+    z: Complex, F: Indices, points: Complex, *, nearest: bool = False
+) -> tuple[Indices, Real]:
     """Find points of the plane in the image's triangles.
 
     Parameters

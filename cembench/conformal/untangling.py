@@ -99,11 +99,7 @@ class _Patches:
     """
 
     def __init__(
-        self,
-        mesh: TriangleMesh,
-        z: Complex,
-        free: NDArray[np.bool_],
-        graph: scipy.sparse.csr_array,
+        self, mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: scipy.sparse.csr_array
     ) -> None:
         self.vertices = np.flatnonzero(free)
         among = graph[self.vertices][:, self.vertices]

@@ -10,6 +10,8 @@ Real = NDArray[np.float64]
 #: Coordinates, a row for each vertex.
 Points = NDArray[np.float64]
 Indices = NDArray[np.int64]
+#: Vertices of a boundary loop, in order.
+Loop = Indices
 Mask = NDArray[np.bool_]
 #: Rows of pixels, with channels.
 Picture = NDArray[np.uint8]

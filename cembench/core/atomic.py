@@ -50,11 +50,7 @@ def write_model(path: Path, model: BaseModel) -> None:
 
 
 def write_bytes(
-    path: Path,
-    content: bytes,
-    *,
-    error: type[CembenchError] = RecordError,
-    parents: bool = True,
+    path: Path, content: bytes, *, error: type[CembenchError] = RecordError, parents: bool = True
 ) -> None:
     """Write bytes to a file; options as for :func:`write`."""
     write(path, lambda file: file.write(content), error=error, parents=parents)

@@ -6,7 +6,6 @@ report also lists the report's files with their hashes; only those are replaced 
 
 from __future__ import annotations
 
-import hashlib
 import uuid
 from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
@@ -16,6 +15,7 @@ from pydantic import BaseModel, Field, ValidationError
 
 from cembench.core.atomic import is_draft, unwritable, write_text
 from cembench.core.errors import RecordError
+from cembench.core.loading import sha256_of
 
 #: Kinds of folders that cembench creates.
 Kind = Literal["run", "report", "validation"]
@@ -103,7 +103,7 @@ def publish(draft: Path, folder: Path, kind: Kind) -> None:
     marker = check(folder, kind) or Marker(kind=kind)
     before = marker.files or {}
     files = sorted(path for path in draft.rglob("*") if path.is_file())
-    made = {path.relative_to(draft).as_posix(): (_sha256(path),) for path in files}
+    made = {path.relative_to(draft).as_posix(): (sha256_of(path),) for path in files}
     in_the_way = [name for name in made if not _may_be_replaced(folder, name, before)]
     if in_the_way:
         held = ", ".join(in_the_way[:_NAMED]) + (", ..." if len(in_the_way) > _NAMED else "")
@@ -146,7 +146,7 @@ def _is_unchanged(folder: Path, name: str, before: dict[str, tuple[str, ...]]) -
     """Whether a file is still as we wrote it; never for a name that leads out of the folder."""
     path = folder / name
     own = path.resolve() == folder.resolve() / name and ".." not in PurePosixPath(name).parts
-    return own and path.is_file() and _sha256(path) in before.get(name, ())
+    return own and path.is_file() and sha256_of(path) in before.get(name, ())
 
 
 def _is_passing(path: Path) -> bool:
@@ -180,8 +180,3 @@ def _read(folder: Path, kind: Kind) -> Marker:
 def _write(folder: Path, marker: Marker) -> None:
     text = marker.model_dump_json(indent=1, exclude_none=True) + "\n"
     write_text(folder / MARKERS[marker.kind], text)
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

@@ -8,6 +8,7 @@ reader's. The folder itself may be reached by one.
 
 from __future__ import annotations
 
+import hashlib
 import io
 import math
 import os
@@ -111,6 +112,12 @@ def _regular(path: Path, handle: int) -> int:
 
 def _opened(path: Path, root: Path | None) -> BinaryIO:
     return os.fdopen(open_file(path, root), "rb")
+
+
+def sha256_of(path: Path) -> str:
+    """Return the SHA-256 of a file as hexadecimal digits."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def read_bytes(path: Path, root: Path | None = None) -> bytes:

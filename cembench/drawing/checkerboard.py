@@ -11,9 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.core.arrays import Real
-
-Ints = NDArray[np.int64]
+from cembench.core.arrays import Indices, Real
 
 #: Parts along the side of a divided square; odd, so that corners keep their colour.
 FINER = 3
@@ -38,9 +36,9 @@ class Checkerboard:
 
     """
 
-    low: Ints
+    low: Indices
     across: int
-    first_part: Ints
+    first_part: Indices
     depth: int = 0
 
     @classmethod
@@ -76,7 +74,7 @@ class Checkerboard:
             start, depth = size, level + 1
         return cls(low, int(across), board, depth)
 
-    def at(self, places: Real) -> tuple[NDArray[np.bool_], Ints]:
+    def at(self, places: Real) -> tuple[NDArray[np.bool_], Indices]:
         """Return whether the board is dark at points (k, 2), and the depth of subdivision there.
 
         Points off the board take the nearest square's value.
@@ -96,14 +94,14 @@ class Checkerboard:
         return dark, level
 
 
-def _roots(places: Real, low: Ints, across: int) -> Ints:
+def _roots(places: Real, low: Indices, across: int) -> Indices:
     """Return the square of side 1 that holds each point."""
     column = np.floor(places[:, 0]).astype(np.int64) - low[0]
     row = np.floor(places[:, 1]).astype(np.int64) - low[1]
     return np.asarray(column.clip(0, across - 1) + across * row)
 
 
-def _part(places: Real, level: int) -> Ints:
+def _part(places: Real, level: int) -> Indices:
     """Return which of its parent's parts holds each point at this level."""
     place = np.floor(places * FINER**level).astype(np.int64) % FINER
     return np.asarray(place[:, 0] + FINER * place[:, 1])

@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy import ndimage
 
-from cembench.core.arrays import Complex, Mask, Picture, Real
+from cembench.core.arrays import Complex, Indices, Mask, Picture, Real
 from cembench.drawing import scene as look
 from cembench.drawing.checkerboard import FINER, MOST_LEVELS
 from cembench.drawing.rasterizer import Raster, rasterize
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
 
-Ints = NDArray[np.int64]
 #: Returns the RGB colours (k, 3) or (3,) of a portion of a panel's samples, 0 to 1.
 Colouring = Callable[[Raster], Any]
 
@@ -68,7 +67,7 @@ class Panel:
 
     """
 
-    F: Ints
+    F: Indices
     points: Real
     raster: Raster
     light: Real
@@ -94,7 +93,7 @@ def under_checkerboard(
     return first, second, board
 
 
-def surface_panel(F: Ints, points: Real, side: int) -> Panel:
+def surface_panel(F: Indices, points: Real, side: int) -> Panel:
     """Rasterize a surface with vertices (n, 3) in the window; its inside is darker."""
     corners = points[F]
     light = look.brightness_of(F, points)[F]
@@ -102,7 +101,7 @@ def surface_panel(F: Ints, points: Real, side: int) -> Panel:
     return Panel(F, points, rasterize(corners.reshape(-1, 3), side * SAMPLES), light)
 
 
-def image_panel(F: Ints, space: Real, uv: Complex, folded: Mask, side: int) -> Panel:
+def image_panel(F: Indices, space: Real, uv: Complex, folded: Mask, side: int) -> Panel:
     """Rasterize an image (n,), folds on top, with the surface's shading, weaker."""
     points = look.image_in_window(uv)
     corners = points[F]
@@ -140,7 +139,7 @@ def shrunk(samples: NDArray[Any]) -> Picture:
     return np.round(total / SAMPLES**2).astype(np.uint8)
 
 
-def draw_clay(F: Ints, points: Real, side: int) -> Picture:
+def draw_clay(F: Indices, points: Real, side: int) -> Picture:
     """Draw a surface, vertices (n, 3) in the window, in one colour; uint8 (side, side, 3)."""
     return paint(surface_panel(F, points, side), lambda _: CLAY)
 

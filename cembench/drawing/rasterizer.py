@@ -7,11 +7,8 @@ from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Real
-
-Ints = NDArray[np.int64]
+from cembench.core.arrays import Indices, Real
 
 #: Candidates (pixels in a triangle's bounding box) that are tested together. This bounds the
 #: memory, and small portions stay in the cache.
@@ -40,8 +37,8 @@ class Raster:
     """
 
     size: int
-    pixel: Ints
-    face: Ints
+    pixel: Indices
+    face: Indices
     weights: Real
 
     def interpolate(self, corners: Real) -> Real:
@@ -100,8 +97,8 @@ class _Triangles:
     across: Real  #: (3, m); NaN for a triangle without area
     down: Real  #: (3, m)
     depths: Real  #: (3, m), of the corners
-    low: Ints  #: (2, m), lowest column and row of a pixel in the bounding box
-    high: Ints  #: (2, m), highest
+    low: Indices  #: (2, m), lowest column and row of a pixel in the bounding box
+    high: Indices  #: (2, m), highest
 
     @classmethod
     def of(cls, xy: Real, z: Real, size: int) -> _Triangles:
@@ -116,12 +113,12 @@ class _Triangles:
         return cls(size, a, across, down, z.T, low.T, high.T)
 
     @property
-    def boxes(self) -> Ints:
+    def boxes(self) -> Indices:
         """Return the number of pixels in each bounding box, (m,)."""
-        counts: Ints = np.maximum(self.high - self.low + 1, 0).prod(axis=0)
+        counts: Indices = np.maximum(self.high - self.low + 1, 0).prod(axis=0)
         return counts
 
-    def covered(self, faces: Ints) -> tuple[Ints, Ints, Real]:
+    def covered(self, faces: Indices) -> tuple[Indices, Indices, Real]:
         """Return every pixel that these triangles cover: triangle, pixel and z."""
         tall = self.high[1, faces] - self.low[1, faces] + 1
         face = np.repeat(faces, tall)  # one row of pixels each
@@ -148,7 +145,7 @@ class _Triangles:
             np.repeat(first, wide) + step * np.repeat(by_column, wide),
         )
 
-    def weights(self, face: Ints, pixel: Ints) -> Real:
+    def weights(self, face: Indices, pixel: Indices) -> Real:
         """Return the barycentric coordinates (k, 3) of pixels in triangles."""
         row = pixel // self.size
         x = pixel - row * self.size - self.corner[0][face]
@@ -160,13 +157,13 @@ class _Triangles:
         return weights
 
 
-def _portions(candidates: Ints) -> list[Ints]:
+def _portions(candidates: Indices) -> list[Indices]:
     """Return the triangles with candidates, in portions of about CHUNK candidates each."""
     wanted = np.flatnonzero(candidates)
     portion = np.cumsum(candidates[wanted]) // CHUNK
     return np.split(wanted, np.flatnonzero(np.diff(portion)) + 1)
 
 
-def _counted(counts: Ints) -> Ints:
+def _counted(counts: Indices) -> Indices:
     """Return 0, 1, ... up to each of these counts, concatenated."""
     return np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)

@@ -13,12 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.planar import signed_areas
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.drawing.camera import view_rotation
 from cembench.drawing.checkerboard import FINER, MOST_LEVELS, Checkerboard
 from cembench.mesh.triangle_mesh import TriangleMesh
-
-Ints = NDArray[np.int64]
 
 #: Squares of the coarsest checkerboard across the image.
 SQUARES = 18
@@ -59,7 +57,7 @@ class Board:
     squares: Checkerboard
 
     @classmethod
-    def of(cls, F: Ints, space: Real, uv: Complex) -> Self:
+    def of(cls, F: Indices, space: Real, uv: Complex) -> Self:
         """Return the board of an image (n,); squares large on the surface `space` are divided.
 
         `space` is (n, 3) in window coordinates.
@@ -75,12 +73,12 @@ def surface_in_window(mesh: TriangleMesh) -> Real:
     return framed(mesh.V @ view_rotation(mesh).T)
 
 
-def folded_by(uv: Complex, F: Ints) -> NDArray[np.bool_]:
+def folded_by(uv: Complex, F: Indices) -> NDArray[np.bool_]:
     """Whether each triangle's image has no positive area, (m,)."""
     return np.asarray(~(signed_areas(uv, F) > 0))
 
 
-def small_folds(uv: Complex, F: Ints) -> Real:
+def small_folds(uv: Complex, F: Indices) -> Real:
     """Return the centres (k, 2) of those folds F (j, 3) that are too small to be seen."""
     corners = image_in_window(uv)[F][:, :, :2]
     return corners[np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2].mean(axis=1)
@@ -104,13 +102,13 @@ def framed(points: Real) -> Real:
     return (points - (low + high) / 2) * (2 * FILL / extent)
 
 
-def _normals(F: Ints, points: Real) -> Real:
+def _normals(F: Indices, points: Real) -> Real:
     """Return twice the vector area of each triangle, shape (m, 3)."""
     corner = points[F[:, 0]]
     return np.cross(points[F[:, 1]] - corner, points[F[:, 2]] - corner)
 
 
-def _to_vertices(F: Ints, values: Real, n: int) -> Real:
+def _to_vertices(F: Indices, values: Real, n: int) -> Real:
     """Return the sum of the values of the triangles at each vertex, shape (n,)."""
     total = np.zeros(n)
     for c in range(3):
@@ -118,7 +116,7 @@ def _to_vertices(F: Ints, values: Real, n: int) -> Real:
     return total
 
 
-def brightness_of(F: Ints, points: Real) -> Real:
+def brightness_of(F: Indices, points: Real) -> Real:
     """Return brightness from wrapped lighting: no part is black, so the board stays visible."""
     normals = _normals(F, points)
     smooth = np.stack([_to_vertices(F, normals[:, k], len(points)) for k in range(3)], axis=1)
@@ -127,7 +125,7 @@ def brightness_of(F: Ints, points: Real) -> Real:
     return np.clip(SHADOW + LAMPLIGHT * ((1 + facing) / 2) ** FALL_OFF, 0.0, 1.0)
 
 
-def fineness_of(F: Ints, space: Real, board: Real) -> Real:
+def fineness_of(F: Indices, space: Real, board: Real) -> Real:
     """Return the depth of subdivision that each vertex needs for squares of the wanted size.
 
     Shape (n,); not rounded: round up to a whole number.

@@ -9,26 +9,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import ValidationError
 
 from cembench.core.errors import ParameterError
 from cembench.results.expressions import with_words
-
-
-class Declaration(BaseModel):
-    """A part of a declaration, which has no other keys than its own."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _allowed(cls, given: Any) -> Any:
-        for name in given if isinstance(given, Mapping) else ():
-            if name not in cls.model_fields:
-                known = ", ".join(cls.model_fields)
-                raise ValueError(f"{name!r} is not known here; allowed are {known}")
-        return given
-
+from cembench.results.papers import Declaration as Declaration
 
 D = TypeVar("D", bound=Declaration)
 

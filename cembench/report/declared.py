@@ -24,7 +24,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -40,14 +40,7 @@ from cembench.report.by_surface import (
 from cembench.report.content.causes import by_cause
 from cembench.report.content.evidence import DISK, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration, filled, own, parsed
-from cembench.report.document import (
-    Column,
-    Table,
-    Value,
-    entry,
-    of_status,
-    words,
-)
+from cembench.report.document import Column, Table, Value, entry, of_status, words
 from cembench.results.columns import (
     COLUMNS,
     FrameColumn,
@@ -142,13 +135,10 @@ class DeclaredColumn(Declaration):
         known = COLUMNS.get(self.column)
         usual = known.heading if known else self.column
         title = self.title or _HEADINGS.get(self.column, usual)
-        unit = self.unit or ("" if known is None or self.group else _unit(known))
+        kept = known is not None and not self.group and known.unit in ("s", "MiB")
+        unit = self.unit or (known.unit if known and kept else "")
         numeric = not (self.words or self.column in _NAMES)
         return Column(title, self.group, unit, numeric)
-
-
-def _unit(column: FrameColumn) -> str:
-    return column.unit if column.unit in ("s", "MiB") else ""
 
 
 class DeclaredTable(Declaration):
@@ -309,7 +299,7 @@ def _columns(
     """Return the columns with their entries, those that are optional only if they hold some."""
     first: list[tuple[Column, list[Value]]] = []
     if spec.rows == "record":
-        rows = _named_rows(frame)
+        rows = frame[["key", "surface", "label"]].to_dict("records")
         made = [[_entry(evidence, row, one) for row in rows] for one in spec.columns]
     else:
         frame = frame.assign(**{name: evaluate(of, frame) for name, of in spec.given.items()})
@@ -358,17 +348,12 @@ def aggregate(one: DeclaredColumn, group: pd.DataFrame) -> Value:
     return entry(value, form, one.lacking, record=key)
 
 
-def _named_rows(frame: pd.DataFrame) -> list[dict[str, Any]]:
-    """Return what the rows are called, and their keys."""
-    return cast("list[dict[str, Any]]", frame[["key", "surface", "label"]].to_dict("records"))
-
-
 def _notes(evidence: Evidence, spec: DeclaredTable, frame: pd.DataFrame) -> Iterable[str]:
     records = [evidence.by_key[key] for key in frame["key"]]
     if "marks" in spec.notes:
         yield from marks_explained(records)
     several = frame["place"].nunique() > 1
-    for row, record in zip(_named_rows(frame), records, strict=True):
+    for row, record in zip(frame.to_dict("records"), records, strict=True):
         surface = f"{row['surface']}, " if several else ""
         where = f"{surface}{row['label']} ({record.cell.solves})"
         if "causes" in spec.notes and record.outcome.status != "ok":

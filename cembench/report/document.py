@@ -144,18 +144,22 @@ class Table(OnTerminal):
         cls,
         name: str,
         title: str,
-        columns: Sequence[Column],
+        columns: Sequence[Column | str],
         rows: Iterable[Sequence[Plain]],
         *,
         origin: Origin = "derived",
         **more: Any,
     ) -> Table:
-        """Return a table of plain entries: texts, numbers, and None for a gap."""
+        """Return a table of plain entries: texts, numbers, and None for a gap.
+
+        A column that is only a title holds texts.
+        """
+        held = [Column(one, numeric=False) if isinstance(one, str) else one for one in columns]
         made = tuple(
-            tuple(_of_column(one, column, origin) for one, column in zip(row, columns, strict=True))
+            tuple(_of_column(one, column, origin) for one, column in zip(row, held, strict=True))
             for row in rows
         )
-        return cls(name, title, tuple(columns), made, **more)
+        return cls(name, title, tuple(held), made, **more)
 
     def only(self, places: Sequence[int]) -> Table:
         """Return the table with these columns alone."""
@@ -405,10 +409,10 @@ def entry(
     return Value(text, number, origin, record)
 
 
-def of_status(status: str, text: str = "", record: str = "", why: str = "") -> Value:
-    """Return how a cell ended as an entry; default text: the status."""
+def of_status(status: str, record: str = "", why: str = "") -> Value:
+    """Return how a cell ended as an entry."""
     tones: Mapping[str, Tone] = {"ok": "good", "skipped": "doubtful"}
-    return Value(text or status, None, "", record, why, tones.get(status, "bad"))
+    return Value(status, None, "", record, why, tones.get(status, "bad"))
 
 
 def _of_column(one: Plain, column: Column, origin: Origin) -> Value:

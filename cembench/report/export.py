@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +31,7 @@ def export_rows(rows: Rows, path: Path, form: Format) -> None:
         The file cannot be written.
 
     """
-    exporters: dict[Format, Callable[[Rows, Any], None]] = {
-        Format.csv: _csv,
-        Format.parquet: _parquet,
-        Format.json: _json,
-    }
+    exporters = {Format.csv: _csv, Format.parquet: _parquet, Format.json: _json}
     if form is Format.parquet:
         require(Extra.PARQUET, "a Parquet file")
     write(path, lambda file: exporters[form](rows, file))

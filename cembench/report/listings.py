@@ -9,16 +9,12 @@ from cembench.registry import Algorithm, Surface
 from cembench.report.document import Column, Plain, Section, Table, Text
 
 
-def _columns(*titles: str) -> list[Column]:
-    return [Column(title, numeric=False) for title in titles]
-
-
 def algorithms_table(algorithms: Sequence[Algorithm], *, verbose: bool) -> Table | Section:
     """Return the algorithms; with `verbose` also their titles, sources and notes."""
     if verbose:
         return Section("algorithms", "", sections=tuple(map(_described, algorithms)))
     rows = [[a.name, a.target, a.mesh_type.__name__, _parameters(a)] for a in algorithms]
-    columns = _columns("algorithm", "maps to", "from", "parameters (defaults)")
+    columns = ("algorithm", "maps to", "from", "parameters (defaults)")
     return Table.of("algorithms", "", columns, rows)
 
 
@@ -30,7 +26,7 @@ def _described(a: Algorithm) -> Section:
 
 def surfaces_table(surfaces: Sequence[Surface], *, verbose: bool) -> Table:
     """Return the surface families; with `verbose` also their notes."""
-    columns = _columns("surface", "title", "parameters (defaults)", *["about"] * verbose)
+    columns = ("surface", "title", "parameters (defaults)", *["about"] * verbose)
     rows = [
         [s.name, s.title, _parameters(s), *([_flowing(s.notes)] if verbose else [])]
         for s in surfaces
@@ -46,9 +42,8 @@ def datasets_table(datasets: Sequence[Mapping[str, Any]]) -> Table:
         size = "-" if d["size"] is None else bytes_text(d["size"])
         fetched = "yes" if d["fetched"] else "no"
         rows.append([d["name"], d["group"] or "-", faces, size, d["licence"], fetched])
-    columns = [*_columns("dataset", "group"), Column("faces"), Column("size")]
-    columns += _columns("licence", "here")
-    return Table.of("datasets", "", columns, rows)
+    sizes = Column("faces"), Column("size")
+    return Table.of("datasets", "", ["dataset", "group", *sizes, "licence", "here"], rows)
 
 
 def bytes_text(size: int) -> str:

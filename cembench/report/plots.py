@@ -62,12 +62,7 @@ class Point(NamedTuple):
 
 
 def through(
-    name: str,
-    points: Sequence[Point],
-    kind: Kind,
-    look: SeriesStyle = PLAIN,
-    *,
-    named: bool = True,
+    name: str, points: Sequence[Point], kind: Kind, look: SeriesStyle = PLAIN, *, named: bool = True
 ) -> PlotSeries:
     """Return a series of points with their tooltips."""
     x, y = [p.x for p in points], [p.y for p in points]
@@ -338,14 +333,8 @@ def _draw_legend(canvas: Canvas, columns: int) -> None:
         for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
             entries.setdefault(label, handle)
     if entries:
-        canvas.legend(
-            list(entries.values()),
-            list(entries),
-            loc="outside lower center",
-            ncols=columns,
-            frameon=False,
-            fontsize=8.5,
-        )
+        style: Any = {"loc": "outside lower center", "frameon": False, "fontsize": 8.5}
+        canvas.legend(list(entries.values()), list(entries), ncols=columns, **style)
 
 
 def _legend_columns(names: Sequence[str], inches: float) -> int:
@@ -388,16 +377,9 @@ def plotly_of(plot: Plot) -> dict[str, Any]:
                 first = plot.panels.index(same[0])
                 layout[f"{side}axis{suffix}"]["matches"] = f"{side}{first + 1 if first else ''}"
         if panel.title:
-            layout["annotations"].append(
-                {
-                    "text": panel.title,
-                    "showarrow": False,
-                    "xref": f"x{suffix} domain",
-                    "yref": f"y{suffix} domain",
-                    "x": 0.5,
-                    "y": 1.1,
-                }
-            )
+            axes = {"xref": f"x{suffix} domain", "yref": f"y{suffix} domain"}
+            titled = {"text": panel.title, "showarrow": False, **axes, "x": 0.5, "y": 1.1}
+            layout["annotations"].append(titled)
         for series in panel.series:
             if series.kind == "stack":
                 layout["barmode"] = "stack"

@@ -5,14 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from cembench.conformal.texel_density import (
-    ISLANDS,
-    density_words,
-    needs_islands,
-    texture_words,
-)
+from cembench.conformal.texel_density import ISLANDS, density_words, needs_islands, texture_words
 from cembench.report.declarations import own
-from cembench.report.document import Column, Table
+from cembench.report.document import Table
 from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
 from cembench.results.frame import filled, phrase
 from cembench.results.papers import paper_of
@@ -38,7 +33,7 @@ def figures_table(
     if full and (advice := texture_advice(record)):
         rows.append(("note", advice))
     rows += ((name, words) for name, words in more if words)
-    return Table.of("record", "", [Column("", numeric=False)] * 2, rows)
+    return Table.of("record", "", ["", ""], rows)
 
 
 def texture_advice(record: Record) -> str:
@@ -62,12 +57,12 @@ def _known(record: Record) -> dict[str, Any]:
     outcome, known = record.outcome, {name: one.of(record) for name, one in COLUMNS.items()}
     seconds, spoken = outcome.median_seconds, seconds_words(record)
     chosen, tried = (outcome.extras.get(key) for key in ("chosen", "tried"))
+    phases = ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items())
     compared = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
     return known | {
         "in_the_paper": _printed(record) if record.mesh.paper_row else "",
-        "took": "" if seconds is None else spoken or f"{significant(seconds)} s",
-        "seconds_words": spoken,
-        "by_phase": ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items()),
+        "took": "" if seconds is None else f", {spoken or f'{significant(seconds)} s'}",
+        "timing": "" if seconds is None else spoken or f"{significant(seconds)} ({phases})",
         "given": [f"{name}={value}" for name, value in record.cell.parameters.items()],
         "chosen": chosen,
         "tried": [f"{name} {_compared(one)}" for name, one in compared.items()],

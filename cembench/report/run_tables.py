@@ -7,17 +7,7 @@ from dataclasses import replace
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
-from cembench.report.document import (
-    Column,
-    Item,
-    Plain,
-    Section,
-    Table,
-    Text,
-    Value,
-    entry,
-    words,
-)
+from cembench.report.document import Column, Item, Plain, Section, Table, Text, Value, entry, words
 from cembench.results.columns import marks_explained
 from cembench.results.comparison import Comparison, compare, reference_of, references
 from cembench.results.frame import listed
@@ -28,7 +18,6 @@ from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Cell, Rec
 from cembench.results.runs_compared import Change
 from cembench.running.estimate import Estimate
 
-SURFACE, ALGORITHM = Column("surface", numeric=False), Column("algorithm", numeric=False)
 #: Maximum number of causes listed.
 MOST_CAUSES = 8
 FEW_ROUNDS = "too few rounds"
@@ -72,36 +61,27 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         return None
     title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
     several = len({record.cell.solves for record, _ in compared}) > 1
-    compared_by_name = [
-        (record.cell.mesh, named(record), f" ({record.cell.solves})" if several else "", comparison)
-        for record, comparison in compared
-    ]
-    if all(comparison.verdict == FEW_ROUNDS for _, comparison in compared):
-        names = list(dict.fromkeys(name for _, name, _, _ in compared_by_name))
+    policies = [f" ({record.cell.solves})" if several else "" for record, _ in compared]
+    found = [comparison for _, comparison in compared]
+    if all(comparison.verdict == FEW_ROUNDS for comparison in found):
+        names = list(dict.fromkeys(named(record) for record, _ in compared))
         lines: dict[str, dict[str, float]] = {}
-        for mesh, name, policy, comparison in compared_by_name:
-            lines.setdefault(mesh + policy, {})[name] = comparison.speedup
+        for (record, comparison), policy in zip(compared, policies, strict=True):
+            lines.setdefault(record.cell.mesh + policy, {})[named(record)] = comparison.speedup
         note = (
             f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
             f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
         )
-        columns = [SURFACE, *(Column(n, form=".2f", lacking="not timed") for n in names)]
+        columns = [Column(name, form=".2f", lacking="not timed") for name in names]
         rows = [[mesh, *map(line.get, names)] for mesh, line in lines.items()]
-        return Table.of("speedups", title, columns, rows, notes=(note,))
-    together = corrected([comparison for _, comparison in compared])
-    return Table.of(
-        "speedups",
-        title,
-        [
-            *(SURFACE, ALGORITHM, Column("speedup", form=".2f"), Column("95 % interval")),
-            Column(f"than {reference}", numeric=False),
-        ],
-        [
-            [mesh, name + policy, one.speedup, _sure(one), one.verdict]
-            for (mesh, name, policy, _), one in zip(compared_by_name, together, strict=True)
-        ],
-        notes=tuple(_corrected_words([comparison for _, comparison in compared])),
-    )
+        return Table.of("speedups", title, ["surface", *columns], rows, notes=(note,))
+    speedup = (Column("speedup", form=".2f"), Column("95 % interval"))
+    titles: list[Column | str] = ["surface", "algorithm", *speedup, f"than {reference}"]
+    compared_rows: list[list[Plain]] = [
+        [record.cell.mesh, named(record) + policy, one.speedup, _sure(one), one.verdict]
+        for (record, _), policy, one in zip(compared, policies, corrected(found), strict=True)
+    ]
+    return Table.of("speedups", title, titles, compared_rows, notes=tuple(_corrected_words(found)))
 
 
 def contest_tables(records: Sequence[Record], reference: str) -> list[Table]:
@@ -154,9 +134,9 @@ def changes_table(changes: Sequence[Change]) -> Table:
         "changes",
         "",
         [
-            *(SURFACE, ALGORITHM, *[Column("solves", numeric=False)] * policies),
+            *("surface", "algorithm", *["solves"] * policies),
             *(Column("before", form=".3g"), Column("after", form=".3g")),
-            *(Column("ratio", form=".2f"), Column("interval"), Column("verdict", numeric=False)),
+            *(Column("ratio", form=".2f"), Column("interval"), "verdict"),
         ],
         [
             [
@@ -213,9 +193,8 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
             gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
             costs = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
         rows.append([cell.mesh, cell.algorithm, cell.solves, faces, *costs, state])
-    costs_columns = [Column(title) for title in ("faces", "a call", "in all", "memory")]
-    solves, basis = Column("solves", numeric=False), Column("from", numeric=False)
-    return Table.of("plan", "", [SURFACE, ALGORITHM, solves, *costs_columns, basis], rows)
+    costs_columns = map(Column, ("faces", "a call", "in all", "memory"))
+    return Table.of("plan", "", ["surface", "algorithm", "solves", *costs_columns, "from"], rows)
 
 
 def many_table(evidence: Evidence) -> Table:

@@ -211,20 +211,16 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
     ratios = history(runs)
     if len(runs) > 1 and ratios:
         write_plot(_plot(runs, ratios), draft)
-    page = (
-        environment()
-        .get_template("site.html")
-        .render(
-            runs=runs,
-            history=ratios,
-            reference=REFERENCE,
-            style=template_text("site.css"),
-            drawn=len(runs) > 1 and bool(ratios),
-            starred=any(one and not one.common for row in ratios.values() for one in row),
-            version=installed_version(),
-        )
+    about = {"runs": runs, "history": ratios, "reference": REFERENCE}
+    page = environment().get_template("site.html")
+    text = page.render(
+        about,
+        style=template_text("site.css"),
+        drawn=len(runs) > 1 and bool(ratios),
+        starred=any(one and not one.common for row in ratios.values() for one in row),
+        version=installed_version(),
     )
-    write_text(draft / "index.html", page)
+    write_text(draft / "index.html", text)
 
 
 def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:

@@ -161,16 +161,9 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> Table:
     folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
     columns = [Column(title) for title in ("vertices", "faces", "boundary")]
     columns += [Column("not Delaunay", form=".1%"), Column("span", form=".2g")]
-    return Table.of(
-        "surface-facts",
-        "",
-        [Column("surface", numeric=False), *columns, Column("in print", numeric=False)],
-        rows,
-        notes=(
-            "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM",
-            f"thumbnails: {', '.join(folders)}",
-        ),
-    )
+    span = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
+    notes = (span, f"thumbnails: {', '.join(folders)}")
+    return Table.of("surface-facts", "", ["surface", *columns, "in print"], rows, notes=notes)
 
 
 def _place(surface: Surface) -> Path:

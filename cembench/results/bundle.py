@@ -31,7 +31,7 @@ from urllib.parse import quote, unquote
 
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import RecordError
-from cembench.core.loading import files_in, is_there, read_bytes
+from cembench.core.loading import files_in, is_there, read_bytes, sha256_of
 from cembench.core.names import distinct_slugs
 from cembench.results.machines import machine_of, machine_of_record
 from cembench.results.records import Record
@@ -188,10 +188,7 @@ _CONTEXT = [f"{ROCRATE}/context", {"sha256": "https://schema.org/sha256"}]
 
 
 def _crate(
-    store: Store,
-    files: Mapping[str, bytes],
-    about: Mapping[str, str],
-    surfaces: Mapping[str, str],
+    store: Store, files: Mapping[str, bytes], about: Mapping[str, str], surfaces: Mapping[str, str]
 ) -> list[dict[str, Any]]:
     """Return the entities of the metadata."""
     records, environments = store.records(), store.environments()
@@ -330,17 +327,15 @@ def unpacked(
             try:
                 submissions[folder], records[name] = _checked(name, path, folder)
                 if signers is not None and submissions[folder].accepted:
-                    submissions[folder] = replace(
-                        submissions[folder], signer=signer(folder, signers, path.name)
-                    )
+                    by = signer(folder, signers, path.name)
+                    submissions[folder] = replace(submissions[folder], signer=by)
             except RecordError as error:
                 about = submissions.get(folder, Submission(name))
                 submissions[folder] = replace(about, faults=(str(error),))
         sound = {one.name: records[one.name] for one in submissions.values() if one.accepted}
         for name, far in far_from_others(sound).items():
-            submissions[Path(above) / name] = replace(
-                submissions[Path(above) / name], faults=tuple(far)
-            )
+            folder = Path(above) / name
+            submissions[folder] = replace(submissions[folder], faults=tuple(far))
         yield submissions
 
 
@@ -422,13 +417,8 @@ def _other_files(folder: Path, names: Sequence[str]) -> Iterator[str]:
             yield f"{name} is not in {METADATA}"
         elif name not in names:
             yield f"{name} is missing"
-        elif _sha256(folder / name) != stated[name]:
+        elif sha256_of(folder / name) != stated[name]:
             yield f"{name} does not have the SHA-256 that {METADATA} gives it"
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _hashes(path: Path) -> dict[str, Any]:

@@ -23,9 +23,10 @@ from cembench.results.comparison import (
     reference_of,
     references,
     seconds_interval,
+    speedup_columns,
 )
 from cembench.results.multiple_testing import corrected
-from cembench.results.records import REFERENCE, LinearAlgebraWork, Outcome, Record
+from cembench.results.records import REFERENCE, LinearAlgebraWork, Record
 
 #: Marks of algorithms that are not cembench's code, in tables.
 PROGRAM_MARK, LIBRARY_MARK = "†", "‡"
@@ -215,22 +216,6 @@ def _end(record: Record, which: str) -> float | None:
     return None if interval is None else float(getattr(interval, which))
 
 
-def _fastest(record: Record) -> float | None:
-    return min((min(r.calls) for r in record.outcome.rounds), default=None)
-
-
-def _together(record: Record) -> list[float | None]:
-    return [r.together_seconds for r in record.outcome.rounds if r.together]
-
-
-def _call(record: Record) -> float | None:
-    return None if record.is_program else record.outcome.median_seconds
-
-
-def _wall(record: Record) -> float | None:
-    return record.outcome.median_seconds if record.is_program else None
-
-
 def _solve_from(record: Record) -> str | None:
     has = record.is_program and record.outcome.solve_seconds
     return solve_words(record) if has else None
@@ -271,10 +256,6 @@ def _in(scale: float, name: str) -> Callable[[Record], float | None]:
     return of
 
 
-def _busy(outcome: Outcome) -> int:
-    return sum(bool(r.neighbours and r.neighbours.busy) for r in outcome.rounds)
-
-
 def _memory(record: Record) -> float | None:
     increase = record.outcome.memory_increase_bytes
     return None if increase is None else increase / MIB
@@ -305,16 +286,18 @@ EXPORTED = (
     _C("iterations", _at("outcome.iterations"), "iterations", form="d"),
     _C("seconds", _at("outcome.median_seconds"), "seconds", timed=True, **_SECONDS),
     _C("seconds_raw", lambda r: list(r.outcome.seconds)),
-    _C("seconds_together", _together),
+    _C(
+        "seconds_together", lambda r: [x.together_seconds for x in r.outcome.rounds if x.together]
+    ),
     _C("seconds_kernel", lambda r: [x.kernel_seconds for x in r.outcome.rounds]),
     _C("seconds_low", lambda r: _end(r, "low")),
     _C("seconds_high", lambda r: _end(r, "high")),
-    _C("seconds_min", _fastest),
+    _C("seconds_min", lambda r: min((min(x.calls) for x in r.outcome.rounds), default=None)),
     _C("seconds_calls", lambda r: [list(x.calls) for x in r.outcome.rounds]),
     _C("unstable", is_unstable),
     _C("ended", _at("outcome.ended")),
     _C("cpu_seconds", _at("outcome.cpu_seconds"), "CPU", **_SECONDS),
-    _C("busy_rounds", lambda r: _busy(r.outcome)),
+    _C("busy_rounds", lambda r: sum(x.busy for x in r.outcome.rounds)),
     _C("start_seconds", _at("outcome.start_seconds"), "start", lacking=_PROGRAM, **_SECONDS),
     _C("own_seconds", _at("outcome.own_seconds")),
     _C(
@@ -363,10 +346,13 @@ DERIVED = (
     _C("half_width", half_width, "±%", form=".0f", lacking="fewer than six rounds"),
     _C("memory_mib", _memory, "memory", "MiB", ",.0f"),
     _C(
-        "call_seconds", _call, "call",
+        "call_seconds", lambda r: None if r.is_program else r.outcome.median_seconds, "call",
         lacking="an external program is a process, not a call", **_SECONDS,
     ),
-    _C("wall_seconds", _wall, "wall", lacking=_PROGRAM, **_SECONDS),
+    _C(
+        "wall_seconds", lambda r: r.outcome.median_seconds if r.is_program else None, "wall",
+        lacking=_PROGRAM, **_SECONDS,
+    ),
     _C(
         "counted_factorisations", _in(1, "numeric"), "factored",
         form=".0f", lacking="not counted",
@@ -426,19 +412,15 @@ def _compared(
     cpu: Comparison | None,
 ) -> dict[str, Any]:
     """Return the columns of the speedup of the reference and its verdicts."""
-    interval = found.speedup_interval if found else None
-    cpu_interval = cpu.interval if cpu else None
+    interval = cpu and cpu.interval
     return {
         "reference": reference.cell.algorithm if found and reference else None,
-        "speedup": found.speedup if found else None,
-        "speedup_low": interval.low if interval else None,
-        "speedup_high": interval.high if interval else None,
-        "verdict": found.verdict if found else None,
-        "verdict_corrected": together.verdict if together else None,
-        "p": together.p if together else None,
-        "cpu_ratio": cpu.ratio if cpu else None,
-        "cpu_ratio_low": cpu_interval.low if cpu_interval else None,
-        "cpu_ratio_high": cpu_interval.high if cpu_interval else None,
+        **speedup_columns(found),
+        "verdict_corrected": together and together.verdict,
+        "p": together and together.p,
+        "cpu_ratio": cpu and cpu.ratio,
+        "cpu_ratio_low": interval and interval.low,
+        "cpu_ratio_high": interval and interval.high,
     }
 
 

@@ -20,7 +20,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
 from statistics import median
-from typing import Literal
+from typing import Any, Literal
 
 from cembench.results.intervals import ERROR, USUAL_PRECISION, Interval, share_of
 from cembench.results.rank_tests import centre_interval, paired_p
@@ -77,15 +77,28 @@ class Comparison:
         return None if i is None else Interval(i.low - 1, i.high - 1)
 
 
+def speedup_columns(found: Comparison | None) -> dict[str, Any]:
+    """Return the columns of a comparison by its speedup; all are None without one."""
+    interval = found and found.speedup_interval
+    return {
+        "speedup": found and found.speedup,
+        "speedup_low": interval and interval.low,
+        "speedup_high": interval and interval.high,
+        "verdict": found and found.verdict,
+    }
+
+
 def ratio_interval(ratios: Sequence[float], share: float = 1.0) -> Interval | None:
     """Return the interval of the centre of positive figures, computed on their logarithms.
 
     `share` is the part of the 5 % error that this interval may use; None for too few figures.
     """
     interval = centre_interval([log(ratio) for ratio in ratios], ERROR * share)
-    if interval is None:
-        return None
-    middle = _middle(ratios)
+    return interval and of_logarithms(interval, middle_ratio(ratios))
+
+
+def of_logarithms(interval: Interval, middle: float) -> Interval:
+    """Return the interval of a ratio from that of its logarithm; it holds the ratio itself."""
     return Interval(min(exp(interval.low), middle), max(exp(interval.high), middle))
 
 
@@ -238,10 +251,11 @@ def compare_ratios(ratios: Sequence[float], share: float = 1.0) -> Comparison:
     """
     interval = ratio_interval(ratios, share)
     p = 1.0 if interval is None else min(1.0, paired_p([log(r) for r in ratios]) / share)
-    return Comparison(_middle(ratios), interval, verdict_of(interval), len(ratios), p)
+    return Comparison(middle_ratio(ratios), interval, verdict_of(interval), len(ratios), p)
 
 
-def _middle(ratios: Sequence[float]) -> float:
+def middle_ratio(ratios: Sequence[float]) -> float:
+    """Return the median of ratios, taken over their logarithms."""
     return exp(median(map(log, ratios)))
 
 

@@ -22,8 +22,8 @@ surfaces as independent and bootstraps of families.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from math import exp, isclose, isnan, sqrt
-from statistics import median
+from math import exp, isclose, isnan, log, sqrt
+from statistics import mean, median
 
 import numpy as np
 
@@ -45,13 +45,20 @@ def family_means(figures: Sequence[float], families: Sequence[Hashable]) -> list
     return [sum(own) / len(own) for own in held.values()]
 
 
+def family_geometric(figures: Sequence[float], families: Sequence[Hashable]) -> float:
+    """Return the geometric mean over families of the geometric means within them."""
+    return exp(mean(family_means(list(map(log, figures)), families)))
+
+
 def share_interval(share: float, families: int) -> Interval:
     """Return the 95 % Wilson interval of a mean of shares, one for each family.
 
     >>> round(share_interval(1.0, 10).low, 3)
     0.722
     """
-    z2 = _normal() ** 2
+    from scipy.special import ndtri  # slow to import
+
+    z2 = float(ndtri((1 + LEVEL) / 2)) ** 2
     middle = (share + z2 / (2 * families)) / (1 + z2 / families)
     half = sqrt(z2 * (share * (1 - share) / families + z2 / (4 * families**2)))
     half /= 1 + z2 / families
@@ -125,12 +132,6 @@ def votes(
     signs = [0 if isclose(a, b, rel_tol=same) else -1 if a < b else 1 for a, b, _ in known]
     sums = family_means(signs, [family for *_, family in known])
     return sum(s < 0 for s in sums), sum(s > 0 for s in sums)
-
-
-def _normal() -> float:
-    from scipy.special import ndtri  # slow to import
-
-    return float(ndtri((1 + LEVEL) / 2))
 
 
 def _around(middle: float, error: float, families: int, *, log: bool) -> Interval:

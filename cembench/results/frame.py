@@ -9,8 +9,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
-from math import exp, log
-from statistics import mean
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -22,6 +20,7 @@ from cembench.results.columns import significant
 from cembench.results.expressions import computed, names_in
 from cembench.results.families import (
     average_interval,
+    family_geometric,
     family_means,
     rate_interval,
     share_interval,
@@ -112,12 +111,14 @@ def _wins(of: pd.Series, families: pd.Series) -> tuple[int, int]:
     return votes([1.0] * len(of), list(of), list(families))
 
 
-def _family_geometric(of: pd.Series, families: pd.Series) -> float:
-    return exp(mean(family_means(list(map(log, of)), list(families))))
+def _family_geometric(of: pd.Series, families: pd.Series) -> float | None:
+    known = of.dropna()
+    return family_geometric(list(known), list(families[known.index])) if len(known) else None
 
 
 def _family_interval(of: pd.Series, families: pd.Series) -> str | None:
-    interval = average_interval(list(of), list(families))
+    known = of.dropna()
+    interval = average_interval(list(known), list(families[known.index]))
     return f"{interval.low:.2f} to {interval.high:.2f}" if interval else None
 
 

@@ -74,15 +74,16 @@ def marks(records: Iterable[Record], environments: Environments) -> Marks:
     if len(counts) < 2:
         return Marks({}, counts, {})
     ordered = [name for name, _ in counts.most_common()]
-    letters = {name: _letter(k) for k, name in enumerate(ordered)}
+    letters = {name: letter(k) for k, name in enumerate(ordered)}
     used = {record.environment for record in chosen}
     by = {key: letters[machine_of(environments.get(key, {}))] for key in used}
     return Marks(letters, counts, by)
 
 
-def _letter(number: int) -> str:
+def letter(number: int) -> str:
+    """Return the mark of a number: A, B, ..., Z, AA, AB, ..."""
     more, this = divmod(number, len(ascii_uppercase))
-    return (_letter(more - 1) if more else "") + ascii_uppercase[this]
+    return (letter(more - 1) if more else "") + ascii_uppercase[this]
 
 
 def software_differences(records: Sequence[Record], environments: Environments) -> list[str]:

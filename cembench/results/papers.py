@@ -15,7 +15,7 @@ import importlib.util
 import re
 import sys
 import tomllib
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
@@ -57,19 +57,21 @@ OF_MODELS, OF_ANY = "ok & main & chosen & model.notna()", "ok & main & chosen"
 Row = Mapping[str, float | None]
 
 
-class _Part(BaseModel):
+class Declaration(BaseModel):
+    """A part of a declaration, which has no other keys than its own."""
+
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     @model_validator(mode="before")
     @classmethod
     def _known(cls, given: Any) -> Any:
-        for name in given if isinstance(given, dict) else ():
+        for name in given if isinstance(given, Mapping) else ():
             if name not in cls.model_fields and cls.model_config["extra"] == "forbid":
                 raise ValueError(_unknown(name, cls.model_fields))
         return given
 
 
-class ProfileLimits(_Part):
+class ProfileLimits(Declaration):
     """The number of smallest models in `quick`, and the most triangles of one in `standard`.
 
     `budgets` are the seconds after which cells get no more rounds, by profile.
@@ -80,7 +82,7 @@ class ProfileLimits(_Part):
     budgets: Mapping[Profile, float] = {}
 
 
-class Picture(_Part):
+class Picture(Declaration):
     """A figure that shows one model with its map."""
 
     figure: str
@@ -88,7 +90,7 @@ class Picture(_Part):
     shows: tuple[Literal["checkerboard", "curvature", "mesh"], ...] = ("checkerboard",)
 
 
-class PlottedFigure(_Part):
+class PlottedFigure(Declaration):
     """A figure that a plot shows, with a panel for each model where it has any.
 
     Its other keys declare the plot (:mod:`cembench.report.declared_plots`).
@@ -99,7 +101,7 @@ class PlottedFigure(_Part):
     models: tuple[str, ...] = ()
 
 
-class ExpectedExhibit(_Part):
+class ExpectedExhibit(Declaration):
     """A figure that a command of cembench adds to a run, as an exhibit of this kind.
 
     With `models` it is one only for surfaces that are, or stand in for, these, in this order.
@@ -112,7 +114,7 @@ class ExpectedExhibit(_Part):
     models: tuple[str, ...] = ()
 
 
-class PrintedFigure(_Part):
+class PrintedFigure(Declaration):
     """A figure of each algorithm in a printed table.
 
     `column` names it in the frame of a run ("rate": the rate of speedup of the reference), and
@@ -129,7 +131,7 @@ class PrintedFigure(_Part):
     unit: Literal["s", "ms", "min"] = "s"
 
 
-class PrintedTable(_Part):
+class PrintedTable(Declaration):
     """A table that shows its printed figures beside measured ones."""
 
     title: str
@@ -144,7 +146,7 @@ class PrintedTable(_Part):
     sources: tuple[str, ...] = ()
 
 
-class Erratum(_Part):
+class Erratum(Declaration):
     """A printed cell that contradicts the rest of the paper."""
 
     table: int
@@ -153,7 +155,7 @@ class Erratum(_Part):
     reason: str
 
 
-class HowRun(_Part):
+class HowRun(Declaration):
     """A parameter with which the paper ran an algorithm on its own models, and elsewhere's value.
 
     Without `models` it is all of them.
@@ -166,7 +168,7 @@ class HowRun(_Part):
     models: tuple[str, ...] = ()
 
 
-class StatedClaim(_Part):
+class StatedClaim(Declaration):
     """A sentence of the paper with its test on a run.
 
     The test is made of expressions (:mod:`cembench.results.frame`), in which the numbers of the
@@ -226,7 +228,7 @@ class StatedClaim(_Part):
     remark: str = ""
 
 
-class Paper(_Part):
+class Paper(Declaration):
     """A paper: what it printed, how it ran its algorithms, and what it claims."""
 
     #: The folder, and the package that it is if it is installed.
@@ -286,10 +288,8 @@ class Paper(_Part):
 
     def table_of(self, column: str) -> int | None:
         """Return the number of the printed table with this column of the frame, if any."""
-        return next(
-            (n for n, table in self.printed.items() if column in {f.column for f in table.figures}),
-            None,
-        )
+        numbers = (n for n, t in self.printed.items() if column in {f.column for f in t.figures})
+        return next(numbers, None)
 
     @property
     def misprints(self) -> Mapping[tuple[int, str, str], str]:
@@ -320,14 +320,8 @@ class Paper(_Part):
 
     def exhibited(self, exhibit: str, models: Sequence[str] = ()) -> str:
         """Return the figure that an exhibit of this kind on these models is; "" if none."""
-        return next(
-            (
-                one.figure
-                for one in self.exhibits
-                if one.exhibit == exhibit and one.models in ((), tuple(models))
-            ),
-            "",
-        )
+        of_kind = (one for one in self.exhibits if one.exhibit == exhibit)
+        return next((one.figure for one in of_kind if one.models in ((), tuple(models))), "")
 
     def as_printed(self, model: str, algorithms: Iterable[Algorithm]) -> dict[str, Any]:
         """Return the parameters with which the paper ran algorithms on this model of its own.
@@ -447,7 +441,8 @@ def read_paper(folder: Path, package: str = "") -> Paper:
         what = first["msg"].removeprefix("Value error, ")
         what = what[0].lower() + what[1:]
         raise _wrong(file, ".".join(map(str, first["loc"])), what) from error
-    _check(paper)
+    for name, where, what in _unmatched(paper):
+        raise _wrong(folder / name, where, what)
     if not paper.models:
         everywhere = [
             claim.model_copy(update={"rows": OF_ANY}) if claim.rows == OF_MODELS else claim
@@ -457,16 +452,15 @@ def read_paper(folder: Path, package: str = "") -> Paper:
     return paper
 
 
-def _check(paper: Paper) -> None:
-    """Raise if one part of a paper names what another does not have."""
+def _unmatched(paper: Paper) -> Iterator[tuple[str, str, str]]:
+    """Yield where one part of a paper names what another does not have: file, place, what."""
     if paper.reference not in paper.algorithms:
         known = ", ".join(paper.algorithms)
         what = f"{paper.reference!r} is none of the paper's algorithms ({known})"
-        raise _wrong(paper.folder / "paper.toml", "reference", what)
+        yield "paper.toml", "reference", what
     for number, model, column in paper.misprints:
         if column not in paper.tables.get(number, {}).get(model, {}):
-            what = f"table {number} has no cell {column!r} of {model!r}"
-            raise _wrong(paper.folder / "tables.toml", "errata", what)
+            yield "tables.toml", "errata", f"table {number} has no cell {column!r} of {model!r}"
     named = [*paper.surfaces, *(picture.model for picture in paper.pictures)]
     named += [model for one in paper.plots.values() for model in one.models]
     named += [model for one in paper.runs for model in one.models]
@@ -475,19 +469,18 @@ def _check(paper: Paper) -> None:
     for model in named:
         if model not in paper.models:
             what = f"no printed table has it; known: {', '.join(paper.models)}"
-            raise _wrong(paper.folder, f"model {model!r}", what)
+            yield "", f"model {model!r}", what
     for model in paper.models if paper.tables else ():
         if not paper.faces(model):
-            what = f"no table has the column 'faces' for {model!r}"
-            raise _wrong(paper.folder / "tables.toml", "tables", what)
+            yield "tables.toml", "tables", f"no table has the column 'faces' for {model!r}"
     names = [claim.name for claim in paper.claims]
     for name in paper.headline:
         if name not in names:
             what = f"there is no claim {name!r}; known: {', '.join(names) or 'none'}"
-            raise _wrong(paper.folder / "paper.toml", "headline", what)
+            yield "paper.toml", "headline", what
     for name in names:
         if names.count(name) > 1:
-            raise _wrong(paper.folder / "claims.toml", f"claim {name!r}", "occurs twice")
+            yield "claims.toml", f"claim {name!r}", "occurs twice"
 
 
 def _wrong(file: Path, where: str, what: str) -> RegistryError:

@@ -100,12 +100,8 @@ def shift_interval(
     left_out = int(np.searchsorted(chances, error / 2, side="right")) - 1
     if left_out < 0:
         return None
-    differences = np.sort(_differences(ours, theirs))
+    differences = np.sort(np.subtract.outer(np.array(ours, float), np.array(theirs, float)).ravel())
     return Interval(float(differences[left_out]), float(differences[-1 - left_out]))
-
-
-def _differences(ours: Sequence[float], theirs: Sequence[float]) -> NDArray[np.float64]:
-    return np.subtract.outer(np.asarray(ours, float), np.asarray(theirs, float)).ravel()
 
 
 def paired_p(logs: Sequence[float]) -> float:

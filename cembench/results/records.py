@@ -282,6 +282,11 @@ class Round(BaseModel):
         return lower_median(self.calls)
 
     @property
+    def busy(self) -> bool:
+        """Whether other work may have affected the seconds."""
+        return self.neighbours is not None and self.neighbours.busy
+
+    @property
     def together_seconds(self) -> float | None:
         """The median of the calls in the shared process; None without one."""
         return lower_median(self.together) if self.together else None

@@ -18,8 +18,8 @@ from math import exp, log
 from statistics import median
 from typing import Any
 
-from cembench.results.comparison import Comparison, verdict_of
-from cembench.results.intervals import ERROR, Interval, share
+from cembench.results.comparison import Comparison, of_logarithms, verdict_of
+from cembench.results.intervals import ERROR, share
 from cembench.results.rank_tests import shift_interval, unpaired_p
 
 Row = Mapping[str, Any]
@@ -74,9 +74,7 @@ def _change(before: Row, after: Row) -> Change:
     ratio = exp(median(ours) - median(theirs))
     part = min(_share(row) for row in (before, after))
     shift = shift_interval(ours, theirs, ERROR * part)
-    interval = (
-        None if shift is None else Interval(min(exp(shift.low), ratio), max(exp(shift.high), ratio))
-    )
+    interval = shift and of_logarithms(shift, ratio)
     p = 1.0 if interval is None else min(1.0, unpaired_p(ours, theirs) / part)
     found = Comparison(ratio, interval, verdict_of(interval), min(new, old), p)
     return Change(before, after, found, drift)

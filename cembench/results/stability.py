@@ -86,10 +86,8 @@ def outlier_lines(records: Iterable[Record]) -> list[str]:
     grouped = [list(g) for _, g in groupby(suspects, key=lambda one: one.record.cell.algorithm)]
     ordered = sorted(grouped, key=lambda maps: (not _is_conformal(maps[0]), -maps[0].times))
     left = sum(map(len, ordered[LISTED:]))
-    return [
-        *map(_line, ordered[:LISTED]),
-        *([f"and {left} more maps by other algorithms"] if left else []),
-    ]
+    more = [f"and {left} more maps by other algorithms"] * bool(left)
+    return [*map(_line, ordered[:LISTED]), *more]
 
 
 def _line(maps: Sequence[Outlier]) -> str:
@@ -99,11 +97,9 @@ def _line(maps: Sequence[Outlier]) -> str:
         f"{one.record.cell.mesh} ({one.angle:.3g}, median {one.median:.3g})" for one in rest[:NAMED]
     )
     more = f" and {len(rest) - NAMED} more" if len(rest) > NAMED else ""
-    return (
-        first.words
-        + (f"; also on {named}{more}" if rest else "")
-        + ("" if _is_conformal(first) else " (its maps are not conformal by design)")
-    )
+    also = f"; also on {named}{more}" if rest else ""
+    design = "" if _is_conformal(first) else " (its maps are not conformal by design)"
+    return first.words + also + design
 
 
 def _is_conformal(found: Outlier) -> bool:
@@ -217,5 +213,4 @@ def _reason(record: Record) -> str:
 
 def _is_beside_work(record: Record) -> bool:
     rounds = record.outcome.rounds
-    busy = sum(bool(r.neighbours and r.neighbours.busy) for r in rounds)
-    return busy >= _BUSY_SHARE * len(rounds)
+    return sum(r.busy for r in rounds) >= _BUSY_SHARE * len(rounds)

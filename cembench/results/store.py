@@ -57,14 +57,7 @@ from cembench.core.loading import (
 from cembench.core.names import file_name
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results import run_folder
-from cembench.results.records import (
-    SCHEMA_VERSION,
-    Cell,
-    Environment,
-    Record,
-    altered,
-    signed,
-)
+from cembench.results.records import SCHEMA_VERSION, Cell, Environment, Record, altered, signed
 from cembench.results.samples import Samples, read_map
 
 

@@ -197,33 +197,25 @@ def different_metrics(
     """Return a text for each figure that differs by more than rounding; null means infinity."""
     size = abs(computed["dirichlet_energy"]) + abs(computed["image_area"])
     worst = computed["dilatation_max"]
-    bounds = {
-        "dirichlet_energy": ROUNDING * size,
-        "image_area": ROUNDING * size,
-        "conformal_energy": ROUNDING * size,  # a small difference of two large terms
-        "angle_error_mean_deg": ROUNDING * 180,
-        "angle_error_sd_deg": ROUNDING * 180,
-        "flipped_triangles": 0.0,
+    scales = {
+        # E_C is a small difference of two large terms.
+        **dict.fromkeys(("dirichlet_energy", "image_area", "conformal_energy"), size),
+        "common_gauge_energy": size,
+        **dict.fromkeys(("angle_error_mean_deg", "angle_error_sd_deg"), 180.0),
         # Computed from 1 - |mu|, which keeps eight digits at a dilatation of 1e8.
-        "dilatation_mean": ROUNDING * worst * worst,
-        "dilatation_max": ROUNDING * worst * worst,
-        "boundary_circularity": ROUNDING,
-        "beltrami_area_mean": ROUNDING,
-        "beltrami_max": ROUNDING,
-        "common_gauge_energy": ROUNDING * size,
-        "area_distortion_mean": ROUNDING
-        * worst,  # from areas, which have few correct digits for slivers
-        "area_distortion_sd": ROUNDING * worst,
-        "overlap_share": ROUNDING,
+        **dict.fromkeys(("dilatation_mean", "dilatation_max"), worst * worst),
+        **dict.fromkeys(("boundary_circularity", "overlap_share"), 1.0),
+        **dict.fromkeys(("beltrami_area_mean", "beltrami_max"), 1.0),
+        # From areas, which have few correct digits for slivers.
+        **dict.fromkeys(("area_distortion_mean", "area_distortion_sd"), worst),
     }
     differing = []
     for name, recomputed in computed.items():
         if name not in recorded:
             continue
         held = inf if (value := recorded[name]) is None else value
-        if held != recomputed and not abs(held - recomputed) <= max(
-            bounds.get(name, 0.0), ROUNDING * abs(recomputed)
-        ):
+        bound = ROUNDING * max(scales.get(name, 0.0), abs(recomputed))
+        if held != recomputed and not abs(held - recomputed) <= bound:
             differing.append(f"{name} {recomputed:.10g}, recorded {held:.10g}")
     return differing
 

@@ -54,11 +54,8 @@ def parameters_fit(algorithm: Algorithm) -> ValidationFinding:
             json.dumps(parameter.default, allow_nan=False)
         except (ParameterError, TypeError, ValueError) as error:
             wrong.append(f"{parameter.name}={parameter.default!r}: {error}")
-    return _finding(
-        "parameters",
-        "; ".join(wrong) or f"{len(algorithm.parameters)} with type and default",
-        ok=not wrong,
-    )
+    right = f"{len(algorithm.parameters)} with type and default"
+    return _finding("parameters", "; ".join(wrong) or right, ok=not wrong)
 
 
 def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
@@ -88,11 +85,9 @@ def reports_its_energy(mapped: CheckedMap) -> ValidationFinding:
         delaunay = 0.5 * np.vdot(mapped.uv, L @ mapped.uv).real - area
         off = min(off, abs(history[-1] - delaunay) / abs(area))
     wrong = "; ".join(f.detail for f in outcome.faults if f.kind is FaultKind.WRONG_REPORT)
-    if wrong:
-        pass
-    elif history and len(history) != iterations + 1:
+    if not wrong and history and len(history) != iterations + 1:
         wrong = f"{len(history)} energies of {iterations} iterations"
-    elif history and not other and not off <= SAME_ENERGY:
+    if not wrong and history and not other and not off <= SAME_ENERGY:
         wrong = f"the last energy is {history[-1]:.6g}, but E_C of the map is {energy:.6g}"
     right = f"{iterations} iterations, last energy off E_C by {off:.1e} of the area"
     if not history:
@@ -108,11 +103,8 @@ def is_repeatable(first: CheckedMap, second: CheckedMap) -> ValidationFinding:
     apart = math.inf
     if first.uv is not None and second.uv is not None:
         apart = float(np.abs(first.uv - second.uv).max())
-    return _finding(
-        "repeatable",
-        "the same bits twice" if same else f"two calls differ by up to {apart:.2g}",
-        ok=same,
-    )
+    measured = "the same bits twice" if same else f"two calls differ by up to {apart:.2g}"
+    return _finding("repeatable", measured, ok=same)
 
 
 def _depends_on_triangles(solver: Solver, first: CheckedMap) -> list[ValidationFinding]:

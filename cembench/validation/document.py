@@ -26,10 +26,11 @@ from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.columns import row
 from cembench.results.comparison import NOT_DETECTED
+from cembench.results.intervals import Interval
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed
+from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.verdict import STAGES, Validation, sentence
 
@@ -149,19 +150,14 @@ def _items(validation: Validation, stage: str, records: Mapping[str, Record]) ->
 
 def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
     titles = ("check", "found", "measured", "allowed")
+    bad = [finding for finding in findings if not finding.ok]
+    notes = [f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in bad]
     return Table.of(
         f"{stage}-findings",
         "Checks",
         [Column(title, numeric=False, detail=title == "allowed") for title in titles],
-        [
-            [finding.name, _found(finding), finding.measured, finding.allowed]
-            for finding in findings
-        ],
-        notes=tuple(
-            dict.fromkeys(
-                f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in findings if not f.ok
-            )
-        ),
+        [[one.name, _found(one), one.measured, one.allowed] for one in findings],
+        notes=tuple(dict.fromkeys(notes)),
     )
 
 
@@ -180,15 +176,16 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
             ("seconds", against.speed),
         ):
             if pairs is not None:
-                ends = (pairs.ratio, pairs.low, pairs.high)
-                rows.append([f"{name} / {against.title}", *_counts(pairs), *ends])
+                counts = [getattr(pairs, side, None) for side in ("lower", "equal", "higher")]
+                ratio = (pairs.ratio, *_ends(pairs.interval))
+                rows.append([f"{name} / {against.title}", *counts, *ratio])
     whole = "of the rounds, not of the surfaces"
     timed = any(against.speed is not None for against in compared)
     return Table.of(
         "summary",
         "Beside the baselines",
         [
-            Column("figure", numeric=False),
+            "figure",
             *(Column(t, "surfaces", lacking=whole) for t in ("lower", "equal", "higher")),
             Column("median ratio", form=".3f", lacking=_TOO_FEW),
             *_ENDS,
@@ -200,20 +197,17 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
     )
 
 
-def _counts(compared: PairedComparison | Speed) -> tuple[int | None, ...]:
-    if isinstance(compared, Speed):
-        return (None, None, None)
-    return (compared.lower, compared.equal, compared.higher)
+def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    return (interval.low, interval.high) if interval else (None, None)
 
 
 def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
     program = ("start", "solve") if against.solve_time else ()
-    columns = [Column("surface", numeric=False), Column("faces")]
+    columns: list[Column | str] = ["surface", Column("faces")]
     for group in (against.energy_name, "mean angle error, °", "seconds"):
         columns += [Column(title, group), Column(against.title, group, detail=True)]
-        columns += [
-            Column(name, group) for name in (*(program if group == "seconds" else ()), "ratio")
-        ]
+        own = program if group == "seconds" else ()
+        columns += [Column(name, group) for name in (*own, "ratio")]
     notes = ["a dash: no valid map, or no positive figure to divide by"]
     if program:
         notes.append(
@@ -252,7 +246,7 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     yield measured(pair.baseline_seconds, ".4f", theirs)
     if program:
         yield from (measured(s, ".4f") for s in (pair.start_seconds, pair.solve_seconds))
-    yield ratio(pair.seconds_ratio)
+    yield ratio(pair.speed.ratio if pair.speed else None)
 
 
 def quotient(ours: float | None, theirs: float | None) -> float | None:
@@ -267,19 +261,15 @@ def _growth_table(compared: GrowthComparison) -> Table:
     for growth in growths:
         at = dict(zip(growth.faces, growth.seconds, strict=True))
         cells = [entry(at.get(f), ".4f", "not timed", origin="surface") for f in sizes]
-        rows.append([growth.what, *cells, growth.exponent, growth.low, growth.high])
-    return Table.of(
-        "growth",
-        "Seconds by number of triangles",
-        [
-            Column("what", numeric=False),
-            *(Column(f"{faces:,}", "faces") for faces in sizes),
-            *(replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)),
-        ],
-        rows,
-        caption="Exponent: of the seconds between the two largest sizes, the median over the "
-        f"rounds. {_CLOCKS[compared.clock]}",
+        rows.append([growth.what, *cells, growth.exponent, *_ends(growth.interval)])
+    columns = [Column(f"{faces:,}", "faces") for faces in sizes]
+    columns += [replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)]
+    caption = (
+        "Exponent: of the seconds between the two largest sizes, the median over the rounds. "
+        f"{_CLOCKS[compared.clock]}"
     )
+    title = "Seconds by number of triangles"
+    return Table.of("growth", title, ["what", *columns], rows, caption=caption)
 
 
 def _growth_plot(compared: GrowthComparison) -> Plot:

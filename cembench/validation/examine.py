@@ -109,14 +109,8 @@ def examine(
         )
     if asked.up_to:
         sizes(asked.up_to)  # fail now, not after the timing
-    work = _Work(
-        solver,
-        registry,
-        folder,
-        asked,
-        hooks or ValidationHooks(),
-        baselines(algorithm, registry, asked.against),
-    )
+    against = baselines(algorithm, registry, asked.against)
+    work = _Work(solver, registry, folder, asked, hooks or ValidationHooks(), against)
     findings: list[ValidationFinding] = []
     skipped: dict[Stage, str] = {}
     parts: dict[str, Any] = {}
@@ -220,14 +214,6 @@ class _Work:
 _Found = tuple[list[ValidationFinding], dict[str, Any], list[Record]]
 
 
-def _contract(work: _Work) -> _Found:
-    return examine_contract(work.solver, work.registry), {}, []
-
-
-def _correctness(work: _Work) -> _Found:
-    return examine_correctness(work.solver, work.registry), {}, []
-
-
 def _quality(work: _Work) -> _Found:
     meshes = list(work.asked.meshes)
     meshes = meshes or surfaces.compared(work.registry, work.kind, work.asked.faces)
@@ -261,11 +247,8 @@ def _scaling(work: _Work) -> _Found:
             return [*findings, scales(None)], figures, ours
         two_largest = set(largest_two(sittings[0], work.name))
         timed = {work.name, *beside}
-        again = [
-            record
-            for record in sittings[-1]
-            if record.cell.mesh in two_largest and record.cell.algorithm in timed
-        ]
+        on_largest = [record for record in sittings[-1] if record.cell.mesh in two_largest]
+        again = [record for record in on_largest if record.cell.algorithm in timed]
         more = more_rounds(growth, monotonic() - started, seconds_a_round(again))
         if not more:
             return [*findings, scales(growth)], figures | {"growth": growth}, ours
@@ -274,8 +257,8 @@ def _scaling(work: _Work) -> _Found:
 
 
 _STAGES: dict[Stage, Callable[[_Work], _Found]] = {
-    "contract": _contract,
-    "correctness": _correctness,
+    "contract": lambda work: (examine_contract(work.solver, work.registry), {}, []),
+    "correctness": lambda work: (examine_correctness(work.solver, work.registry), {}, []),
     "quality": _quality,
     "scaling": _scaling,
 }

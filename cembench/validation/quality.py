@@ -14,8 +14,7 @@ corrected for multiple comparisons (Holm).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import exp, log
-from statistics import median
+from itertools import starmap
 
 from pydantic import BaseModel, ConfigDict
 
@@ -27,9 +26,9 @@ from cembench.results.comparison import (
     compare_ratios,
     confirmed,
     measured_ratios,
+    middle_ratio,
     paired_ratios,
 )
-from cembench.results.comparison import Verdict as SpeedVerdict
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record
@@ -54,27 +53,12 @@ class PairedComparison(BaseModel):
     higher: int
     #: Median over the surfaces of our figure over theirs, and its 95 % interval.
     ratio: float | None
-    low: float | None
-    high: float | None
+    interval: Interval | None
 
     @property
     def surfaces(self) -> int:
         """Number of pairs."""
         return self.lower + self.equal + self.higher
-
-
-class Speed(BaseModel):
-    """Our seconds over the baseline's, with the interval over the rounds and its verdict."""
-
-    model_config = ConfigDict(frozen=True)
-
-    ratio: float
-    low: float | None
-    high: float | None
-    verdict: SpeedVerdict
-    rounds: int
-    #: p-value of the difference; see `results.comparison`.
-    p: float = 1.0
 
 
 class Pair(BaseModel):
@@ -98,8 +82,8 @@ class Pair(BaseModel):
     baseline_angle: float | None
     seconds: float | None
     baseline_seconds: float | None
-    seconds_ratio: float | None
-    speed: SpeedVerdict | None
+    #: Its verdict holds together with those of the other surfaces.
+    speed: Comparison | None
     #: For an external program: its wall-clock seconds on a small mesh, and its solve time, which
     #: the ratio uses.
     start_seconds: float | None = None
@@ -129,8 +113,8 @@ class BaselineComparison(BaseModel):
     pairs: tuple[Pair, ...]
     energy: PairedComparison
     angle: PairedComparison
-    #: None if no round timed both.
-    speed: Speed | None
+    #: Our seconds over the baseline's, over the rounds; None if no round timed both.
+    speed: Comparison | None
     #: For an external program, the origin of the solve time that the ratios use.
     solve_time: str = ""
 
@@ -160,10 +144,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     # The size of an image that is not the unit disk is free.
     relative = (one.target, other.target) != ("disk", "disk")
     gauge = not relative and all(_has_gauge(r) for n in names for r in (mine[n], theirs[n]))
-    verdicts = _verdicts([(mine[name], theirs[name]) for name in names])
+    both = [(mine[name], theirs[name]) for name in names]
     pairs = tuple(
-        _pair(mine[name], theirs[name], verdict, relative=relative, gauge=gauge)
-        for name, verdict in zip(names, verdicts, strict=True)
+        _pair(*records, speed, relative=relative, gauge=gauge)
+        for records, speed in zip(both, _corrected(list(starmap(compare, both))), strict=True)
     )
     return BaselineComparison(
         baseline=baseline,
@@ -173,77 +157,49 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
         pairs=pairs,
         energy=sides([ratio for p in pairs if (ratio := p.energy_ratio) is not None]),
         angle=sides([ratio for p in pairs if (ratio := p.angle_ratio) is not None]),
-        speed=compare_speed([(mine[name], theirs[name]) for name in names]),
+        speed=compare_speed(both),
         solve_time=next((solve_words(r) for r in mine.values() if r.is_program), ""),
     )
 
 
 def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
     """Return the comparisons with verdicts on speed corrected for their number (Holm)."""
-    verdicts = iter(corrected([_comparison(a.speed) for a in against if a.speed is not None]))
+    speeds = _corrected([a.speed for a in against])
     return tuple(
-        a if a.speed is None else _with_verdict(a, next(verdicts).verdict) for a in against
+        a.model_copy(update={"speed": one}) for a, one in zip(against, speeds, strict=True)
     )
 
 
-def _with_verdict(against: BaselineComparison, verdict: SpeedVerdict) -> BaselineComparison:
-    assert against.speed is not None
-    return against.model_copy(
-        update={"speed": against.speed.model_copy(update={"verdict": verdict})}
-    )
-
-
-def _comparison(speed: Speed) -> Comparison:
-    interval = None
-    if speed.low is not None and speed.high is not None:
-        interval = Interval(speed.low, speed.high)
-    return Comparison(speed.ratio, interval, speed.verdict, speed.rounds, speed.p)
-
-
-def _verdicts(pairs: Sequence[tuple[Record, Record]]) -> list[SpeedVerdict | None]:
-    """Return the corrected verdict on speed for each surface; None without times."""
-    comparisons = [compare(ours, theirs) for ours, theirs in pairs]
-    verdicts = iter(corrected([one for one in comparisons if one is not None]))
-    return [None if one is None else next(verdicts).verdict for one in comparisons]
+def _corrected(found: Sequence[Comparison | None]) -> list[Comparison | None]:
+    """Return comparisons whose verdicts hold together; None without times."""
+    held = iter(corrected([one for one in found if one is not None]))
+    return [one and next(held) for one in found]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:
     """Return the summary of ratios, ours over theirs, over the surfaces."""
-    interval = median_interval(ratios)
     return PairedComparison(
         lower=sum(ratio < 1 - TIE for ratio in ratios),
         equal=sum(1 - TIE <= ratio <= 1 + TIE for ratio in ratios),
         higher=sum(ratio > 1 + TIE for ratio in ratios),
-        ratio=_median_ratio(ratios) if ratios else None,
-        low=interval.low if interval else None,
-        high=interval.high if interval else None,
+        ratio=middle_ratio(ratios) if ratios else None,
+        interval=median_interval(ratios),
     )
 
 
-def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Speed | None:
+def compare_speed(pairs: Sequence[tuple[Record, Record]]) -> Comparison | None:
     """Return the speed comparison over all surfaces on which both were timed."""
     by_round = _by_round([paired_ratios(ours, theirs) for ours, theirs in pairs])
     if not by_round:
         return None
     measured = _by_round([measured_ratios(ours, theirs) for ours, theirs in pairs])
-    comparison = confirmed(compare_ratios(by_round), measured)
-    low, high = (
-        (comparison.interval.low, comparison.interval.high) if comparison.interval else (None, None)
-    )
-    return Speed(
-        ratio=comparison.ratio,
-        low=low,
-        high=high,
-        verdict=comparison.verdict,
-        rounds=len(by_round),
-        p=comparison.p,
-    )
+    return confirmed(compare_ratios(by_round), measured)
 
 
 def _by_round(by_surface: Sequence[Sequence[float]]) -> list[float]:
     """Return the median ratio over the surfaces that have ratios, for each round."""
     known = [ratios for ratios in by_surface if ratios]
-    return [_median_ratio(ratios) for ratios in zip(*known, strict=False)]
+    return [middle_ratio(ratios) for ratios in zip(*known, strict=False)]
 
 
 def folds_on(records: Sequence[Record]) -> list[str]:
@@ -273,21 +229,15 @@ def quality_findings(records: Sequence[Record]) -> list[ValidationFinding]:
     changing = [
         r.cell.mesh for r in records if of_kind(NoticeKind.NOT_DETERMINISTIC, r.outcome.notes)
     ]
-    repeated = finding(
-        "quality",
-        "repeatable in every round",
-        f"different bits in a later call on {', '.join(changing)}"
-        if changing
-        else "the same bits in every round",
-        ok=not changing,
-    )
+    bits = f"different bits in a later call on {', '.join(changing)}"
+    measured = bits if changing else "the same bits in every round"
+    repeated = finding("quality", "repeatable in every round", measured, ok=not changing)
     return [maps_every_surface("quality", records), repeated]
 
 
 def _pair(
-    ours: Record, theirs: Record, verdict: SpeedVerdict | None, *, relative: bool, gauge: bool
+    ours: Record, theirs: Record, speed: Comparison | None, *, relative: bool, gauge: bool
 ) -> Pair:
-    comparison = compare(ours, theirs)
     return Pair(
         surface=ours.cell.mesh,
         faces=ours.mesh.faces,
@@ -297,8 +247,7 @@ def _pair(
         baseline_angle=_valid(theirs).get("angle_error_mean_deg"),
         seconds=ours.outcome.median_seconds if ours.outcome.status == "ok" else None,
         baseline_seconds=theirs.outcome.median_seconds if theirs.outcome.status == "ok" else None,
-        seconds_ratio=comparison.ratio if comparison else None,
-        speed=verdict,
+        speed=speed,
         start_seconds=ours.outcome.start_seconds,
         solve_seconds=ours.outcome.solve_seconds if ours.is_program else None,
         records=(ours.cell.key, theirs.cell.key),
@@ -324,10 +273,6 @@ def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
     if energy is None or not area:
         return None
     return worse * (energy / area if relative else energy)
-
-
-def _median_ratio(ratios: Sequence[float]) -> float:
-    return exp(median(map(log, ratios)))
 
 
 def _only_folds(record: Record) -> bool:

@@ -61,7 +61,7 @@ class Growth(BaseModel):
     """Seconds against triangles, and the exponent of growth between the two largest meshes.
 
     On smaller meshes constant costs hide the growth. Each round has its own exponent;
-    `exponent` is their median, `low` and `high` the ends of its 95 % interval.
+    `exponent` is their median, with its 95 % interval.
     """
 
     model_config = ConfigDict(frozen=True)
@@ -72,8 +72,7 @@ class Growth(BaseModel):
     seconds: tuple[float, ...]
     exponent: float
     #: None: too few rounds for an interval.
-    low: float | None = None
-    high: float | None = None
+    interval: Interval | None = None
     rounds: int = 1
 
 
@@ -90,8 +89,7 @@ class GrowthComparison(BaseModel):
     reference: str | None = None
     #: Our exponent less the reference's: the median over the rounds and its 95 % interval.
     above: float | None = None
-    above_low: float | None = None
-    above_high: float | None = None
+    above_interval: Interval | None = None
 
 
 def sizes(up_to: int) -> tuple[int, ...]:
@@ -152,7 +150,6 @@ def growth_of(
         factored = theirs.of_phase(_FACTORISATION)
         if factored is not None:
             others.append(factored.growth(f"{reference}'s {_FACTORISATION}", "wall"))
-    beside = _interval(above) if above else None
     return GrowthComparison(
         answer=answer_of(exponents, above),
         clock=clock,
@@ -160,8 +157,7 @@ def growth_of(
         others=tuple(others),
         reference=reference if above else None,
         above=median(above) if above else None,
-        above_low=beside.low if beside else None,
-        above_high=beside.high if beside else None,
+        above_interval=_interval(above) if above else None,
     )
 
 
@@ -176,7 +172,7 @@ def more_rounds(
     if rounds >= MOST_ROUNDS or growth.answer is not GrowthAnswer.inconclusive:
         return 0
     more = next_look(rounds, MOST_ROUNDS) - rounds
-    first = growth.ours.low is None
+    first = growth.ours.interval is None
     if more * seconds_a_round + (0 if first else spent) <= most:
         return more
     return more if first and growth.ours.exponent > MOST_EXPONENT else 0
@@ -194,13 +190,10 @@ def largest_two(records: Sequence[Record], ours: str) -> list[str]:
 
 def scales(growth: GrowthComparison | None) -> ValidationFinding:
     """Check our growth; None for too few sizes. An inconclusive answer is not a fault."""
-    measured = "it could not be timed on two sizes"
-    if growth is not None:
-        measured = _words(growth)
     return finding(
         "scaling",
         "growth of the seconds",
-        measured,
+        "it could not be timed on two sizes" if growth is None else _words(growth),
         ok=growth is not None and growth.answer is not GrowthAnswer.too_steep,
         undecided=growth is not None and growth.answer is GrowthAnswer.inconclusive,
         most=MOST_EXPONENT,
@@ -210,20 +203,20 @@ def scales(growth: GrowthComparison | None) -> ValidationFinding:
 
 def _words(growth: GrowthComparison) -> str:
     ours = growth.ours
-    text = f"seconds grow like faces^{ours.exponent:.2f}{_range(ours.low, ours.high)}"
+    text = f"seconds grow like faces^{ours.exponent:.2f}{_range(ours.interval)}"
     text += f" from {ours.faces[-2]:,} to {ours.faces[-1]:,} triangles"
     if growth.above is not None:
-        text += f", {growth.above:.2f}{_range(growth.above_low, growth.above_high)} above "
+        text += f", {growth.above:.2f}{_range(growth.above_interval)} above "
         text += ", ".join(f"{other.what} {other.exponent:.2f}" for other in growth.others[:1])
     if growth.answer is GrowthAnswer.inconclusive:
-        few = ours.low is None
+        few = ours.interval is None
         why = f"{ours.rounds} rounds are too few" if few else f"not after {ours.rounds} rounds"
         text += f"; inconclusive ({why})"
     return text
 
 
-def _range(low: float | None, high: float | None) -> str:
-    return "" if low is None or high is None else f" ({low:.2f} to {high:.2f})"
+def _range(interval: Interval | None) -> str:
+    return f" ({interval.low:.2f} to {interval.high:.2f})" if interval else ""
 
 
 class _Timed(NamedTuple):
@@ -253,15 +246,13 @@ class _Timed(NamedTuple):
     def growth(self, what: str, clock: Clock) -> Growth:
         """Return the growth with its interval."""
         exponents = self.exponents(clock)
-        interval = _interval(exponents)
         by_size = (*self.sizes[:-2], *self.largest)
         return Growth(
             what=what,
             faces=self.faces,
             seconds=tuple(lower_median([_seconds(r, clock) for r in size]) for size in by_size),
             exponent=median(exponents),
-            low=interval.low if interval else None,
-            high=interval.high if interval else None,
+            interval=_interval(exponents),
             rounds=len(exponents),
         )
 

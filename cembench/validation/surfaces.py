@@ -19,16 +19,14 @@ _REFINED: dict[type[TriangleMesh], dict[str, tuple[int, ...]]] = {
     DiskMesh: {"spherical-cap": (384, 1536, 6144), "hemi-ellipsoid": (384, 1536, 6144)},
     HoledMesh: {"catenoid-ring": (384, 1536, 6144), "holed-cap": (2000, 3000, 4500)},
 }
+#: Default disks of a comparison.
+USUAL_DISKS = (
+    *("hemi-ellipsoid", "catenoid-sheet", "cylinder-sheet", "cone"),
+    *("cowboy-hat-stand-in", "nefertiti-stand-in"),
+)
 #: Default surfaces of the comparison: family and parameters.
 _COMPARED: dict[type[TriangleMesh], tuple[tuple[str, dict[str, Any]], ...]] = {
-    DiskMesh: (
-        ("hemi-ellipsoid", {}),
-        ("catenoid-sheet", {}),
-        ("cylinder-sheet", {}),
-        ("cone", {}),
-        ("cowboy-hat-stand-in", {}),
-        ("nefertiti-stand-in", {}),
-    ),
+    DiskMesh: tuple((name, {}) for name in USUAL_DISKS),
     HoledMesh: (
         ("catenoid-ring", {}),
         *(("holed-cap", {"holes": holes}) for holes in (1, 2, 3, 5, 8)),

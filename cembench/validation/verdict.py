@@ -11,9 +11,10 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict
 
+from cembench.results.comparison import Comparison
 from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
-from cembench.validation.quality import BaselineComparison, PairedComparison, Speed
+from cembench.validation.quality import BaselineComparison, PairedComparison
 from cembench.validation.scaling import GrowthAnswer, GrowthComparison
 from cembench.validation.sizes import is_higher_at_last, looked_at_words, ratios_by_size
 
@@ -147,8 +148,8 @@ def _energy_words(against: BaselineComparison) -> str:
 
 def _ratio_words(compared: PairedComparison) -> str:
     text = f"median ratio {compared.ratio:.2f}"
-    if compared.low is not None:
-        return f"{text}, 95 % interval {compared.low:.2f}-{compared.high:.2f}"
+    if compared.interval is not None:
+        return f"{text}, 95 % interval {compared.interval.low:.2f}-{compared.interval.high:.2f}"
     return f"{text}, too few surfaces for an interval"
 
 
@@ -158,17 +159,17 @@ def _times(ratio: float, low: float, high: float, unit: str) -> str:
     return f"{ratio:.{digits}f} times {unit} ({low:.{digits}f}-{high:.{digits}f})"
 
 
-def _speed_words(speed: Speed, title: str, *, named: bool) -> str:
-    than = f" than {title}" if named else ""
-    if speed.low is None or speed.high is None:
+def _speed_words(speed: Comparison, title: str, *, named: bool) -> str:
+    than, interval = f" than {title}" if named else "", speed.interval
+    if interval is None:
         return f"{speed.ratio:.2f} times {title}'s seconds, too few rounds for a verdict"
     if speed.verdict == "faster":
-        return _times(1 / speed.ratio, 1 / speed.high, 1 / speed.low, f"faster{than}")
+        return _times(1 / speed.ratio, 1 / interval.high, 1 / interval.low, f"faster{than}")
     if speed.verdict == "slower":
-        return _times(speed.ratio, speed.low, speed.high, f"slower{than}")
+        return _times(speed.ratio, interval.low, interval.high, f"slower{than}")
     return (
         f"neither faster nor slower than {title} for sure "
-        f"({speed.low:.2f}-{speed.high:.2f} times its seconds)"
+        f"({interval.low:.2f}-{interval.high:.2f} times its seconds)"
     )
 
 
@@ -202,8 +203,8 @@ def _meets_against(requirement: Requirement, against: BaselineComparison) -> boo
     if energy.ratio is None:
         return False
     if requirement is Requirement.better:
-        return energy.high is not None and energy.high < 1
-    return energy.ratio <= 1 if energy.low is None else energy.low <= 1
+        return energy.interval is not None and energy.interval.high < 1
+    return (energy.interval.low if energy.interval else energy.ratio) <= 1
 
 
 def _surfaces(names: Sequence[str]) -> str:

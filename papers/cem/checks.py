@@ -17,6 +17,7 @@ from cembench.core.arrays import Complex
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.topology import vertex_graph
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
+from cembench.results.columns import significant
 from cembench.results.papers import Row
 
 from .boundary_operator import BoundaryOperator
@@ -281,6 +282,37 @@ def qiem_is_decided_here(cells: int) -> str:
 def mean_printed(rates: Mapping[str, Row], algorithm: str) -> float:
     """Return the mean of the printed rates over an algorithm."""
     return float(np.mean([row[algorithm] for row in rates.values() if row[algorithm]]))
+
+
+def rounds_lacking(lacks: int, known: int) -> str:
+    """Return how many times have too few rounds, beside those known, as the end of a phrase."""
+    return f"; too few rounds on {lacks}{' more' * (known > 0)}" if lacks else ""
+
+
+def average_words(rates: pd.Series, printed: float, between: str) -> str:
+    """Return the averages of rates beside that of the printed ones, with the interval or ""."""
+    if rates.empty:
+        return "no average"
+    known = rates.to_numpy(float)
+    geometric = np.exp(np.log(1 + known).mean()) - 1
+    sure = f" ({between})" if between else ""
+    return (
+        f"mean {known.mean():.1f}{sure}, printed for these {printed:.1f}, geometric {geometric:.1f}"
+    )
+
+
+def below_a_second(faces: pd.Series, seconds: pd.Series, surface: pd.Series, many: int) -> str:
+    """Return how many times are below a second, and that of the smallest surface."""
+    if seconds.empty:
+        return f"No time on a surface of more than {many:,} triangles in this run"
+    quick, smallest = faces[seconds < 1], seconds[faces == faces.min()]
+    fits = f", the largest {quick.max():,.0f} triangles" if len(quick) else ""
+    fits += f" ({surface[quick.idxmax()]})" if len(quick) else ""
+    return (
+        f"{len(quick)} of {len(seconds)} times below a second{fits}; the smallest of these "
+        f"surfaces is {surface[smallest.idxmin()]} with {faces.min():,.0f}: "
+        f"{significant(smallest.min())} s"
+    )
 
 
 def reading_of_fdm(public: pd.Series) -> str:

@@ -20,6 +20,7 @@ from cembench.report.document import Column, Figure, Report, Section, Table, Tex
 from cembench.report.pictures import with_transparent_background
 from cembench.report.render import html
 from cembench.report.render.html import write_html
+from cembench.results.machines import letter
 from tests.report.sample_report import CITATION, HOSTILE, sample_report
 
 VOID = {"meta", "link", "img", "br", "input"}
@@ -265,8 +266,8 @@ def test_equal_causes_are_one_remark(tmp_path):
 
 
 def test_remarks_are_lettered_beyond_the_alphabet():
-    assert [html._letters(k) for k in (0, 25, 26, 51, 52, 701, 702)] == [
-        "a", "z", "aa", "az", "ba", "zz", "aaa"
+    assert [letter(k) for k in (0, 25, 26, 51, 52, 701, 702)] == [
+        "A", "Z", "AA", "AZ", "BA", "ZZ", "AAA"
     ]  # fmt: skip
 
 

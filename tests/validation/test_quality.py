@@ -40,9 +40,9 @@ def test_ratios_within_one_percent_are_ties():
 
 
 def test_an_interval_needs_six_surfaces():
-    assert sides([0.9] * 5).low is None
+    assert sides([0.9] * 5).interval is None
     pair = sides([0.7, 0.8, 0.9, 0.95, 1.0, 1.1])
-    assert (pair.low, pair.high) == (0.7, 1.1)
+    assert (pair.interval.low, pair.interval.high) == (0.7, 1.1)
     assert sides([]).ratio is None
 
 
@@ -95,7 +95,8 @@ def test_speed_is_judged_over_rounds_paired_on_every_surface():
     records += [record("cem", name, seconds=slow_rounds) for name in "ab"]
     found = comparison_with(records, "ours", "cem").speed
     assert (found.ratio, found.verdict, found.rounds) == (pytest.approx(0.5), "faster", 6)
-    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(0.5))
+    ends = found.interval.low, found.interval.high
+    assert ends == (pytest.approx(0.5), pytest.approx(0.5))
 
 
 def test_folds_are_counted_and_are_no_fault():

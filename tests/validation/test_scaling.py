@@ -48,9 +48,9 @@ def found(ours, reference=None, **more):
 def test_the_exponent_of_a_power_is_found_with_its_interval():
     one = found(1.25, 1.0, slower=[1.0, 1.02, 0.98, 1.01, 0.99, 1.03, 0.97])
     assert one.ours.exponent == pytest.approx(1.25)
-    assert one.ours.low == pytest.approx(1.25 + log(0.97) / log(3), abs=1e-3)
-    assert one.ours.high == pytest.approx(1.25 + log(1.03) / log(3), abs=1e-3)
-    assert (one.above, one.above_low) == pytest.approx((0.25, 0.25))
+    assert one.ours.interval.low == pytest.approx(1.25 + log(0.97) / log(3), abs=1e-3)
+    assert one.ours.interval.high == pytest.approx(1.25 + log(1.03) / log(3), abs=1e-3)
+    assert (one.above, one.above_interval.low) == pytest.approx((0.25, 0.25))
     assert (one.answer, one.ours.rounds) == ("fine", 7)
 
 
@@ -75,8 +75,8 @@ def test_what_does_not_grow_hides_nothing():
 def test_a_machine_on_which_large_meshes_are_dearer_is_no_fault():
     """Measured once: 1.94 where a quiet machine has 1.68; the reference felt it as well."""
     one = found(1.68, 1.0, slower=[1.33] * 7)
-    assert one.ours.low > 1.9
-    assert one.above_high < 0.7
+    assert one.ours.interval.low > 1.9
+    assert one.above_interval.high < 0.7
     assert one.answer == "fine"
     assert found(1.68, slower=[1.33] * 7).answer == "too_steep"
 
@@ -92,7 +92,7 @@ def test_what_a_busy_machine_does_to_the_wall_clock_is_no_fault():
     one = growth_of([mixed], "ours", None)
     assert (one.clock, one.answer) == ("cpu", "fine")
     wall = growth_of([slowed], "ours", None)
-    assert (wall.answer, wall.ours.high > 2) == ("inconclusive", True)
+    assert (wall.answer, wall.ours.interval.high > 2) == ("inconclusive", True)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.05])
@@ -119,8 +119,8 @@ def test_rounds_of_several_sittings_are_paired_within_each():
     assert len(largest) == 4
     one = growth_of([first, largest], "ours", "cem")
     assert (one.ours.rounds, one.ours.faces) == (7, FACES)
-    assert (one.above_low, one.above_high) == pytest.approx((0.2, 0.2))
-    assert one.ours.high > 1.2 + log(2) / log(3)
+    assert (one.above_interval.low, one.above_interval.high) == pytest.approx((0.2, 0.2))
+    assert one.ours.interval.high > 1.2 + log(2) / log(3)
     lost = [
         changed(r, outcome={"status": "failed"}) if r.cell.algorithm == "ours" else r
         for r in largest

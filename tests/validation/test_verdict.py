@@ -1,8 +1,10 @@
 import pytest
 
+from cembench.results.comparison import Comparison
+from cembench.results.intervals import Interval
 from cembench.validation.document import validation_text
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, Speed, sides
+from cembench.validation.quality import BaselineComparison, Pair, PairedComparison, sides
 from cembench.validation.verdict import Requirement, Validation, sentence, unmet
 from tests.terminal import printed
 
@@ -13,13 +15,18 @@ def finding(name, measured, ok):
     )
 
 
+def interval(low, high):
+    return None if low is None else Interval(low, high)
+
+
 def against(title="CEM", energy=(17, 0, 3, 0.93, 0.90, 0.96), speed=(0.55, 0.53, 0.58, "faster")):
-    counts = dict(zip(("lower", "equal", "higher", "ratio", "low", "high"), energy, strict=True))
-    comparison = PairedComparison(**counts)
+    *counts, low, high = energy
+    counts = dict(zip(("lower", "equal", "higher", "ratio"), counts, strict=True))
+    comparison = PairedComparison(**counts, interval=interval(low, high))
     timed = None
     if speed:
         ratio, low, high, verdict = speed
-        timed = Speed(ratio=ratio, low=low, high=high, verdict=verdict, rounds=6)
+        timed = Comparison(ratio, interval(low, high), verdict, 6)
     return BaselineComparison(
         baseline=title.lower(),
         title=title,
@@ -153,7 +160,7 @@ def test_angle_errors_that_are_rounding_count_as_equal():
     pair = Pair(
         surface="sheet", faces=100, energy=0.0, baseline_energy=0.0,
         angle=4e-13, baseline_angle=2e-13, seconds=1.0, baseline_seconds=1.0,
-        seconds_ratio=1.0, speed="undecided", records=("a", "b"),
+        speed=None, records=("a", "b"),
     )  # fmt: skip
     assert pair.angle_ratio == 1
     assert sides([pair.angle_ratio]).equal == 1

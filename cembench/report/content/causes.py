@@ -100,13 +100,11 @@ def worst_table(evidence: Evidence, surfaces: Sequence[MeasuredSurface]) -> Tabl
                 " ".join(one.help for one in chosen) or "-",
             ]
         )
-    texts = dict.fromkeys(("surface", "family", "causes", "what helps"))
-    headings = ("surface", "family", "triangles", "best map", "causes", "what helps")
-    forms = {"triangles": ",.0f", "best map": ".2f"}
+    sizes = (Column("triangles", form=",.0f"), Column("best map", form=".2f"))
     return Table.of(
         "worst-causes",
         f"Why the {len(surfaces)} hardest surfaces are hard",
-        [Column(name, numeric=name not in texts, form=forms.get(name, "")) for name in headings],
+        ["surface", "family", *sizes, "causes", "what helps"],
         rows,
         caption="Best map: the smallest mean angle error of a valid map, in degrees.",
     )

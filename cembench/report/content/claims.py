@@ -274,8 +274,8 @@ def in_short(tested: Sequence[Claim]) -> Table:
         for what, claims in lists.items()
         if claims
     ]
-    columns = [Column("claims", numeric=False), Column("which", numeric=False)]
-    return Table.of("claims-in-short", "The claims in short", columns, rows, origin="")
+    titles = ("claims", "which")
+    return Table.of("claims-in-short", "The claims in short", titles, rows, origin="")
 
 
 def _case(

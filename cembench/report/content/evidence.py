@@ -20,7 +20,7 @@ from cembench.report.difficulty import Difficulty, Shape, difficulty, shape
 from cembench.report.palette import SeriesStyle, series_styles
 from cembench.results import columns
 from cembench.results.columns import COLUMNS, DERIVED, family_of
-from cembench.results.comparison import Comparison, compare, latest
+from cembench.results.comparison import Comparison, compare, latest, speedup_columns
 from cembench.results.exhibits import Exhibit, read_exhibits
 from cembench.results.machines import Marks, marks
 from cembench.results.papers import NO_PAPER, Paper, paper_of, papers, usual_paper
@@ -43,7 +43,8 @@ FRAME_COLUMNS = (
 #: A map is as good as another if its mean angle error is at most this many times as large, or this
 #: many degrees larger.
 AS_GOOD, DEGREES = 1.25, 0.25
-Row = Mapping[str, Any]
+#: What a surface has of its record.
+_FACTS = ("vertices", "faces", "boundary_vertices", "non_delaunay_share")
 #: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
 
@@ -197,17 +198,17 @@ class Evidence:
             place, surface = surfaces[record.cell.mesh_hash]
             figures = dict.fromkeys(COLUMNS) | self.row(record)
             figures |= {column.name: column.of(record) for column in DERIVED}
-            about = {"surface": surface.title, "place": place, "label": own.label, "series": k}
+            about: dict[str, Any] = {"surface": surface.title, "place": place}
+            about |= {"label": own.label, "series": k}
             about["contest"] = self.contest_name(own.target, record.cell.solves)
             about["contested"] = own.target in self.contests
             about["to"] = "" if own.target == DISK else f", {own.target}"
-            more: dict[str, Any] = {"main": own.main, "ok": record.outcome.status == "ok"}
-            more["model"], more["origin"] = surface.paper_row or None, surface.origin
-            more["counted"] = surface in counted
-            more["once"] = surface not in left_out
-            more["printed"] = own.algorithm in self.paper.algorithms
-            more["reference"] = own.algorithm == self.reference
-            rows.append(figures | about | more | self._compared(record.cell.key))
+            about |= {"main": own.main, "ok": record.outcome.status == "ok"}
+            about |= {"model": surface.paper_row or None, "origin": surface.origin}
+            about |= {"counted": surface in counted, "once": surface not in left_out}
+            about["printed"] = own.algorithm in self.paper.algorithms
+            about["reference"] = own.algorithm == self.reference
+            rows.append(figures | about | self._compared(record.cell.key))
         order = {policy: k for k, policy in enumerate(self.policies)}
         rows.sort(key=lambda row: (row["place"], row["series"], order[str(row["solves"])]))
         frame = pd.DataFrame(rows)
@@ -290,10 +291,7 @@ class Evidence:
             surfaces[record.cell.mesh_hash] = MeasuredSurface(
                 name=record.cell.mesh,
                 mesh_hash=record.cell.mesh_hash,
-                vertices=facts.vertices,
-                faces=facts.faces,
-                boundary_vertices=facts.boundary_vertices,
-                non_delaunay_share=facts.non_delaunay_share,
+                **{name: getattr(facts, name) for name in _FACTS},
                 paper_row=row,
                 origin=origin,
                 family=family,
@@ -485,13 +483,9 @@ class Evidence:
 
     def _compared(self, key: str) -> dict[str, Any]:
         comparison = self.comparisons.get(key)
-        interval = comparison and comparison.speedup_interval
         return {
             "comparison": comparison,
-            "speedup": comparison and comparison.speedup,
-            "speedup_low": interval and interval.low,
-            "speedup_high": interval and interval.high,
-            "verdict": comparison and comparison.verdict,
+            **speedup_columns(comparison),
             "ratio": comparison and comparison.ratio,
             "paired": comparison.rounds if comparison else 0,
         }

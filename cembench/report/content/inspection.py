@@ -24,12 +24,7 @@ from cembench.drawing.view_scene import (
     view_scene,
 )
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.report.content.evidence import (
-    DISK,
-    AlgorithmSeries,
-    Evidence,
-    MeasuredSurface,
-)
+from cembench.report.content.evidence import DISK, AlgorithmSeries, Evidence, MeasuredSurface
 from cembench.report.document import Figure
 from cembench.results.records import Record
 

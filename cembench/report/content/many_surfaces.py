@@ -48,9 +48,7 @@ def hardest(evidence: Evidence) -> tuple[MeasuredSurface, ...]:
 
 
 def hardest_gallery(
-    evidence: Evidence,
-    surfaces: Sequence[MeasuredSurface],
-    inspections: Mapping[str, Inspection],
+    evidence: Evidence, surfaces: Sequence[MeasuredSurface], inspections: Mapping[str, Inspection]
 ) -> Gallery | None:
     """Return the best map of each of these surfaces; None if the run saved no surface."""
     labels = evidence.best_maps["label"].to_dict()
@@ -72,9 +70,7 @@ def is_many(evidence: Evidence) -> bool:
 
 
 def hard_section(
-    evidence: Evidence,
-    shown: Sequence[MeasuredSurface],
-    inspections: Mapping[str, Inspection],
+    evidence: Evidence, shown: Sequence[MeasuredSurface], inspections: Mapping[str, Inspection]
 ) -> Section:
     """Return who fails where, and the hardest surfaces with their causes and pictures."""
     table = declared_table(evidence, "who-fails-where")

@@ -12,7 +12,6 @@ from cembench.report.content.standings import listed
 from cembench.report.document import (
     VERDICTS,
     Claim,
-    Column,
     Plain,
     Table,
     Tone,
@@ -55,7 +54,8 @@ def headline(evidence: Evidence) -> str:
     reference, others = paper.reference.upper(), [name.upper() for name in paper.compared]
     won, lost = (int((rows["verdict"] == one).sum()) for one in ("slower", "faster"))
     if not won + lost:
-        start = f"The rounds are too few to say whether {reference} is faster than {_any(others)}."
+        any_of = listed(others, "or")
+        start = f"The rounds are too few to say whether {reference} is faster than {any_of}."
     elif not lost:
         start = f"{reference} is faster than {listed(others)} wherever these rounds decide it"
         start += f" ({won} of {len(rows)} comparisons)."
@@ -84,16 +84,10 @@ def origins_of(evidence: Evidence) -> dict[MeshOrigin, str]:
     }
 
 
-def _any(names: Sequence[str]) -> str:
-    *first, last = names
-    return f"{', '.join(first)} or {last}" if first else last
-
-
 def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
     """Return the main claims: what is printed, and what holds here by the origin of surfaces."""
     origins = origins_of(evidence)
     titles = ("claim", "printed", *(origins.values() or ["here"]))
-    columns = [Column(title, numeric=False) for title in titles]
     rated = evidence.paper.stated.get("rate")
     rows = list(_rate_rows(evidence, list(origins)))[:ROWS] if rated else []
     rows += list(_claim_rows(evidence, tested, list(origins)))[: ROWS - len(rows)]
@@ -106,7 +100,7 @@ def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
         "printed figure."
     )
     notes = (note,) if rated else ()
-    return Table.of("head", "The main claims", columns, rows, origin="", notes=notes)
+    return Table.of("head", "The main claims", titles, rows, origin="", notes=notes)
 
 
 def _rate_rows(evidence: Evidence, origins: Sequence[MeshOrigin]) -> Iterator[list[Plain]]:

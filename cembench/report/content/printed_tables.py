@@ -144,11 +144,8 @@ def averages_table(evidence: Evidence, number: int, policy: str, origin: MeshOri
     sets = {}
     for a in paper.compared:
         measured = measured_rates(evidence, a, policy, origin)
-        sets[a] = (
-            printed_rates(paper, a),
-            printed_rates(paper, a, list(measured)),
-            [*measured.values()],
-        )
+        in_print = [printed_rates(paper, a, models) for models in (None, list(measured))]
+        sets[a] = (*in_print, [*measured.values()])
         counts += [words(""), *(entry(len(rates), "d", "") for rates in sets[a])]
         work.append(work_ratios(evidence, a, policy, origin))
     for k, reading in enumerate(READINGS):

@@ -32,7 +32,6 @@ from cembench.report.document import (
     Claim,
     Column,
     Figure,
-    Findings,
     Item,
     Plain,
     Report,
@@ -82,8 +81,8 @@ def _table(evidence: Evidence) -> Table:
         surfaces = len({record.cell.mesh_hash for record in own})
         cpu = str(about.get("cpu") or "-")
         rows.append([letter, name or "not named", cpu, surfaces, len(own)])
-    columns = [Column(title, numeric=False) for title in ("mark", "machine", "processor")]
-    columns += [Column("surfaces"), Column("cells")]
+    counts = Column("surfaces"), Column("cells")
+    columns = ("mark", "machine", "processor", *counts)
     return Table.of("machines", "Machines of this run", columns, rows, origin="")
 
 
@@ -150,7 +149,8 @@ def build_report(
         sections.append(Section("not-ok", "Cells without a valid map", (not_ok(evidence),)))
     sections.append(Section("surfaces", "Surfaces", (), tuple(pages)))
     progress("done", n, n)
-    head = many_findings(evidence) if over_many else _findings(run, sections)
+    tested = [item for s in sections for item in s.items if isinstance(item, Claim)]
+    head = many_findings(evidence) if over_many else findings(evidence, inspections, tested)
     return Report(
         title=evidence.paper.title + PAPER if of_paper else _title_of_own_surfaces(evidence),
         findings=replace(head, plot=_first_plot(sections)),
@@ -160,11 +160,6 @@ def build_report(
         records=evidence.rows,
         paper=evidence.paper if of_paper else None,
     )
-
-
-def _findings(run: _Run, sections: Sequence[Section]) -> Findings:
-    tested = [item for s in sections for item in s.items if isinstance(item, Claim)]
-    return findings(run.evidence, run.seen, tested)
 
 
 def _first_plot(sections: Sequence[Section]) -> Figure | None:

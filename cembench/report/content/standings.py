@@ -17,7 +17,13 @@ from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, DISK, Evidence
 from cembench.report.declarations import own
 from cembench.report.document import Column, Finding, Plain, Table, Value, missing
-from cembench.results.comparison import Comparison, compare_ratios, paired_ratios, verdict_of
+from cembench.results.comparison import (
+    Comparison,
+    compare_ratios,
+    middle_ratio,
+    paired_ratios,
+    verdict_of,
+)
 from cembench.results.families import (
     FEWEST_FAMILIES,
     average_interval,
@@ -170,7 +176,7 @@ def _speeds(
     if not ratios:
         return None
     if len(set(families)) >= FEWEST_FAMILIES:
-        middles = [exp(median(map(log, ratio))) for ratio in ratios]
+        middles = list(map(middle_ratio, ratios))
         over = _over_families(middles, families)
         return Comparison(over.mean, over.interval, verdict_of(over.interval), len(ratios))
     rounds = min(map(len, ratios))
@@ -189,14 +195,12 @@ def contests_of(evidence: Evidence, policy: str) -> list[dict[str, Any]]:
 def standings(contest: Mapping[str, Any]) -> Table:
     """Return the algorithms of a contest in a row each, the smallest angle errors first."""
     order, good = contest["order"], contest["good"]
-    columns = [
-        Column("algorithm", numeric=False),
+    columns: list[Column | str] = [
+        "algorithm",
         *(Column("valid maps"), Column("mean angle error", unit="°", form=".2f")),
         *(Column(f"error over {contest['best']}'s"), Column("smallest on", detail=True)),
-        *(
-            Column(f"within {contest['within']} % on", detail=True),
-            Column(f"time over {good[0]}'s"),
-        ),
+        Column(f"within {contest['within']} % on", detail=True),
+        Column(f"time over {good[0]}'s"),
     ]
     rows = list(_ranked(contest))
     fitted, few = "stand-ins were fitted to its angle errors", "too few valid maps to be compared"
@@ -206,19 +210,15 @@ def standings(contest: Mapping[str, Any]) -> Table:
     ]
     name = "standings" if contest["target"] == DISK else f"standings-{slug(contest['target'])}"
     but = "" if len(good) > 1 else " No other is about as good."
-    return Table.of(
-        name,
-        f"{contest['title']}, ranked by their angle errors",
-        columns,
-        rows,
-        notes=(
-            f"Over {contest['on']}; solves: {contest['policy']}. The smallest are the angle "
-            f"errors of {order[0]}. The fastest is {good[0]}, of the maps about as good as the "
-            f"best: at most {AS_GOOD} times the smallest error, or {DEGREES}° larger, on every "
-            f"surface.{but} In brackets are 95 % intervals, of angles where there are "
-            f"{FEWEST_FAMILIES} families of surfaces.",
-        ),
+    note = (
+        f"Over {contest['on']}; solves: {contest['policy']}. The smallest are the angle errors of "
+        f"{order[0]}. The fastest is {good[0]}, of the maps about as good as the best: at most "
+        f"{AS_GOOD} times the smallest error, or {DEGREES}° larger, on every surface.{but} In "
+        f"brackets are 95 % intervals, of angles where there are {FEWEST_FAMILIES} families of "
+        "surfaces."
     )
+    title = f"{contest['title']}, ranked by their angle errors"
+    return Table.of(name, title, columns, rows, notes=(note,))
 
 
 def rank_tables(contests: Sequence[Mapping[str, Any]]) -> list[Table]:
@@ -264,10 +264,9 @@ def contest_figures(contest: Mapping[str, Any]) -> list[Finding]:
     return figures
 
 
-def listed(names: Sequence[str]) -> str:
+def listed(names: Sequence[str], last: str = "and") -> str:
     """Return names as "a, b and c"."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+    return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def surfaces_words(surfaces: int, families: int) -> str:

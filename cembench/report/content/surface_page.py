@@ -6,15 +6,7 @@ from cembench.report.content.evidence import Evidence, MeasuredSurface
 from cembench.report.content.inspection import Inspection
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
-from cembench.report.document import (
-    ORIGINS,
-    Gallery,
-    Gap,
-    Item,
-    Section,
-    Table,
-    Text,
-)
+from cembench.report.document import ORIGINS, Gallery, Gap, Item, Section, Table, Text
 from cembench.report.plots import Plot
 
 

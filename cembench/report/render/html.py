@@ -46,15 +46,10 @@ from cembench.report.document import (
     groups_of,
     items_of,
 )
-from cembench.report.pictures import (
-    embed_pixels,
-    embed_vector,
-    pixel_cap,
-    size_of,
-    unreadable,
-)
+from cembench.report.pictures import embed_pixels, embed_vector, pixel_cap, size_of, unreadable
 from cembench.report.render import templates
 from cembench.results.columns import COLUMNS
+from cembench.results.machines import letter
 
 #: The facets, each with the columns of a record whose values name a choice.
 FACETS: Mapping[str, tuple[str, ...]] = {
@@ -268,7 +263,7 @@ def _table(table: Table, keys: Mapping[str, str], anchor: str) -> Mapping[str, A
     columns = list(zip(*body, strict=True)) or [()] * len(table.columns)
     common = [_common_origin(column) for column in columns]
     remarks = list(dict.fromkeys(v.why for row in table.rows for v in row if v.why))
-    letters = {why: _letters(place) for place, why in enumerate(remarks)}
+    letters = {why: letter(place).lower() for place, why in enumerate(remarks)}
 
     def cell(value: Value, place: int) -> _Cell:
         known = common[place] == value.origin
@@ -317,12 +312,6 @@ def _sortable(number: float | None) -> str:
 def _common_origin(values: Sequence[Value]) -> Any:
     origins = {value.origin for value in values if value.number is not None}
     return origins.pop() if len(origins) == 1 else ""
-
-
-def _letters(place: int) -> str:
-    """Return the mark of a remark: a, b, ..., z, aa, ab, ..."""
-    rest, last = divmod(place, 26)
-    return (_letters(rest - 1) if rest else "") + chr(ord("a") + last)
 
 
 # --- figures ---------------------------------------------------------------------------------

@@ -54,11 +54,6 @@ def environment(escape: Callable[[str], str] | None = None, **more: Any) -> jinj
     kinds = (Claim, Figure, Gallery, Gap, Table, Text)
     forms.tests |= {kind.__name__.lower(): lambda it, k=kind: isinstance(it, k) for kind in kinds}
     forms.filters |= {"heading": heading, "csv": csv_of}
-    forms.globals |= {
-        "ORIGINS": ORIGINS,
-        "SIGNS": SIGNS,
-        "SUSPECTS": SUSPECTS,
-        "Counter": Counter,
-        "marked": marked,
-    }
+    forms.globals |= {"ORIGINS": ORIGINS, "SIGNS": SIGNS, "SUSPECTS": SUSPECTS}
+    forms.globals |= {"Counter": Counter, "marked": marked}
     return forms
