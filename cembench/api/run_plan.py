@@ -12,7 +12,6 @@ from cembench.api.map_surfaces import local_files
 from cembench.api.sets import Gathered, gathered, surfaces_of_set
 from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import Reporter
 from cembench.core.wording import Advice, Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -138,14 +137,12 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
         raise ParameterError.about(
             "{pairing:'process'} is for runs on this machine; leave it out, or leave {cluster} out."
         )
-    from cembench.running.cluster.connect import MODULES, check_submits, parse_cluster
+    from cembench.running.cluster.connect import parse_cluster
 
     if not isinstance(cluster, str):
-        require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
         return
     where = parse_cluster(cluster)
-    require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
-    check_submits(where)
+    where.check()
     if where.is_open:
         reporter.warn(
             f"{where.address} does not authenticate clients: anyone who can connect can run code "

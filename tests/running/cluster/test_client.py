@@ -81,12 +81,7 @@ def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_
     assert again.steps == []
 
 
-@pytest.mark.parametrize("look_every", [module.LOOK_EVERY, 15.0], ids=["looks", "hears-first"])
-def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(
-    client, tmp_path, monkeypatch, look_every
-):
-    """A restarted worker may report that it took the unit before it was seen to be there."""
-    monkeypatch.setattr(module, "LOOK_EVERY", look_every)
+def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(client, tmp_path):
     deadly = tasks_of("ends-the-worker", surfaces=SURFACES[:1], plugin=DEADLY)
     tasks = [*deadly, *tasks_of("good", surfaces=SURFACES[1:])]
     store, heard = Store(tmp_path), Listener()
@@ -134,7 +129,7 @@ def test_a_worker_without_cembench_ends_the_run_and_says_so(client, tmp_path, mo
     def fails():
         raise ModuleNotFoundError("No module named 'cembench'")
 
-    monkeypatch.setattr(module, "describe_worker", fails)
+    monkeypatch.setattr(module, "describe_environment", fails)
     with pytest.raises(ClusterError, match=r"cannot measure: No module named .*\. Install"):
         run_on_cluster(tasks_of("good"), Store(tmp_path), client)
 
