@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ from cembench.running.options import Options
 from cembench.running.plan import (
     Provenance,
     Task,
+    comparable_groups,
     mesh_files,
     provenance_of,
     provenances,
@@ -149,6 +151,30 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
             "as the users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others "
             "off it."
         )
+
+
+def part_of(tasks: Sequence[Task], part: str) -> list[Task]:
+    """Return the cells of a part, such as "3/20"; cells that are compared are in the same one.
+
+    The surfaces are dealt out by their number of triangles, so that parts take alike.
+
+    Raises
+    ------
+    ParameterError
+        There is no such part.
+
+    """
+    number, count = map(int, part.split("/")) if re.fullmatch(r"\d+/\d+", part) else (0, 0)
+    groups = sorted(comparable_groups(tasks), key=lambda group: -group[0].facts.faces)
+    if not 1 <= number <= min(count, len(groups)):
+        raise ParameterError.about(
+            "{given} is not allowed; write 3/20 for the third of twenty parts. This plan can have "
+            "up to {most}, since a surface under a policy is measured as a whole.",
+            given=Setting("part", repr(part)),
+            most=len(groups),
+        )
+    chosen = {task.cell.label for group in groups[number - 1 :: count] for task in group}
+    return [task for task in tasks if task.cell.label in chosen]
 
 
 def read_surfaces(

@@ -35,24 +35,24 @@ def hours(
 
     known = {id(task): cost for task, cost in zip(tasks, costs, strict=True) if cost is not None}
     groups = comparable_groups([task for task in tasks if id(task) in known])
-    priced = [[known[id(task)] for task in group] for group in groups]
-    whole = sum(one.seconds for group in priced for one in group)
-    by_workers: dict[int, float] = {}
+    units = [[known[id(task)] for task in group] for group in groups]
+    whole = [sum(cost.seconds for cost in unit) for unit in units]
+    by_machines: dict[int, float] = {}
     seconds: list[float] = []
     for machines in ESTIMATED_FOR:
-        share = None if budget is None else budget * machines / (whole or 1.0)
+        share = None if budget is None else budget * machines / (sum(whole) or 1.0)
         seconds = [
-            planned_seconds(g, None if share is None else share * sum(one.seconds for one in g))
-            for g in priced
+            planned_seconds(unit, None if share is None else share * alone)
+            for unit, alone in zip(units, whole, strict=True)
         ]
-        by_workers[machines] = makespan(seconds, machines)
-    longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
+        by_machines[machines] = makespan(seconds, machines)
+    longest = max(range(len(units)), key=seconds.__getitem__, default=None)
     return {
-        "seconds": by_workers,
-        "units": len(groups),
+        "seconds": by_machines,
+        "units": len(units),
         "useful": most_useful(seconds),
-        "longest": None if longest is None else longest[1][0].cell.mesh,
-        "longest_seconds": None if longest is None else longest[0],
+        "longest": None if longest is None else groups[longest][0].cell.mesh,
+        "longest_seconds": None if longest is None else seconds[longest],
     }
 
 

@@ -11,6 +11,7 @@ import uuid
 import warnings
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from queue import Empty, SimpleQueue
@@ -18,7 +19,6 @@ from time import monotonic
 from typing import Any
 
 from distributed import Client, Future, KilledWorker, LocalCluster
-from distributed.client import FutureCancelledError
 from pydantic import ValidationError
 
 from cembench.core.errors import ClusterError
@@ -45,8 +45,6 @@ MOST_LOST = 2
 LOOK_EVERY = 1.0
 #: Seconds for the records of a unit to arrive.
 ARRIVES_WITHIN = 600.0
-#: Seconds without any worker before a message says so.
-_PATIENCE = 5.0
 #: Seconds without any worker after which a run on this machine's own workers ends: dask restarts
 #: them, but only so often. On other clusters, workers can join at any time.
 LOCAL_PATIENCE = 120.0
@@ -90,15 +88,26 @@ class _Job:
     tasks: Mapping[str, Task]
     #: As expected.
     seconds: float
-    future: Future | None = None
+    future: Any = None
     #: Number of workers that were lost with it, and what the last one did.
     lost: int = 0
-    activity: str = ""
+    during: str = ""
+
+
+@dataclass(eq=False)
+class _Worker:
+    """A worker, also after it was lost."""
+
+    address: str
+    environment: dict[str, Any]
+    state: MachineState
+    #: How its software differs; with `same_environment` such a worker gets no unit.
+    differs: str = ""
+    job: _Job | None = None
 
     @property
-    def during(self) -> str:
-        """The activity, to be appended to a message."""
-        return f" in {self.activity}" if self.activity else ""
+    def machine(self) -> str:
+        return self.state.machine
 
 
 @dataclass(eq=False)
@@ -109,23 +118,19 @@ class _ClusterRun:
     client: Client
     same_environment: bool
     topic: str = field(default_factory=lambda: f"cembench-{uuid.uuid4().hex[:12]}")
-    #: What workers report, and futures that are done.
-    events: SimpleQueue[Mapping[str, Any] | Future] = field(default_factory=SimpleQueue)
+    #: What workers report, and their futures that are done.
+    events: SimpleQueue[Mapping[str, Any] | tuple[_Worker, Future]] = field(
+        default_factory=SimpleQueue
+    )
     #: The longest last.
     waiting: list[_Job] = field(default_factory=list)
-    #: By the addresses of workers, as all below.
-    working: dict[str, _Job] = field(default_factory=dict)
-    connected: list[str] = field(default_factory=list)
-    machines: dict[str, MachineState] = field(default_factory=dict)
-    environments: dict[str, dict[str, Any]] = field(default_factory=dict)
-    #: How the software of those differs that get no unit.
-    refused: dict[str, str] = field(default_factory=dict)
+    #: By their addresses; a lost one stays.
+    workers: dict[str, _Worker] = field(default_factory=dict)
     state: ClusterState = field(default_factory=lambda: ClusterState(units=0))
     since: float = field(default_factory=monotonic)
     #: When the workers were looked at, and when there was one.
     looked: float = 0.0
     met: float = field(default_factory=monotonic)
-    reported_alone: bool = False
     #: Expected seconds of the units that are done.
     done: float = 0.0
 
@@ -133,22 +138,30 @@ class _ClusterRun:
     def watcher(self) -> Watcher:
         return self.recorder.watcher
 
+    @property
+    def sent(self) -> list[_Job]:
+        """The units that workers have."""
+        return [worker.job for worker in self.workers.values() if worker.job]
+
     def measure(self, pending: Sequence[Task]) -> None:
         if not pending:
             return
         self._look()
+        if not self.workers:
+            self.watcher.shows("no worker is connected yet; waiting for one")
         self.waiting = self._jobs(pending)
         self.state.units = len(self.waiting)
         rounds = next_look(0, self.recorder.options.most_rounds)
         self.watcher.begins(sum(1 + (task.cell.repeats or rounds) for task in pending))
         self.client.subscribe_topic(self.topic, lambda event: self.events.put(event[1]))
-        while self.waiting or self.working:
-            for worker in self.connected:
-                if self.waiting and worker not in self.working and worker not in self.refused:
+        while self.waiting or self.sent:
+            for worker in self._connected():
+                refused = self.same_environment and worker.differs
+                if self.waiting and not worker.job and not refused:
                     self._send(worker, self.waiting.pop())
             with suppress(Empty):
                 event = self.events.get(timeout=LOOK_EVERY)
-                self._report(event) if isinstance(event, Mapping) else self._end(event)
+                self._report(event) if isinstance(event, Mapping) else self._end(*event)
             if monotonic() - self.looked > LOOK_EVERY:
                 self._look()
         self._save_state()
@@ -157,8 +170,8 @@ class _ClusterRun:
         """Cancel the units that workers have; the workers notice it."""
         with suppress(Exception):  # the scheduler may be gone
             self.client.unsubscribe_topic(self.topic)
-            if self.working and self.client.status == "running":
-                self.client.cancel([job.future for job in self.working.values()], force=True)
+            if self.sent and self.client.status == "running":
+                self.client.cancel([job.future for job in self.sent], force=True)
 
     def _jobs(self, pending: Sequence[Task]) -> list[_Job]:
         """Pack the units, the longest last: sent at the end, it would keep the others waiting."""
@@ -174,7 +187,7 @@ class _ClusterRun:
             for t in pending
         }
         # Per expected second, so that all units are cut by the same factor.
-        share = (options.budget or 0.0) * max(1, len(self.connected)) / sum(costs.values())
+        share = (options.budget or 0.0) * max(1, len(self.workers)) / sum(costs.values())
         jobs = []
         for group in comparable_groups(pending):
             tasks = {task.cell.label: task for task in group}
@@ -183,58 +196,52 @@ class _ClusterRun:
             jobs.append(_Job(pack(group, token, own), tasks, seconds))
         return sorted(jobs, key=lambda job: job.seconds)
 
-    def _send(self, worker: str, job: _Job) -> None:
+    def _send(self, worker: _Worker, job: _Job) -> None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # that the arrays are large
-            key = f"cembench-unit-{job.unit.key}-{uuid.uuid4().hex[:6]}"
             job.future = self.client.submit(
-                *(measure_unit, job.unit, self.topic), key=key, pure=False, workers=[worker]
+                *(measure_unit, job.unit, self.topic),
+                key=f"cembench-unit-{job.unit.key}-{uuid.uuid4().hex[:6]}",
+                pure=False,
+                workers=[worker.address],
             )
-        self.working[worker] = job
-        self.machines[worker].at = job.unit.mesh.name
-        job.future.add_done_callback(self.events.put)
+        worker.job, worker.state.at = job, job.unit.mesh.name
+        job.future.add_done_callback(lambda done: self.events.put((worker, done)))
 
     def _report(self, event: Mapping[str, Any]) -> None:
         """Show what a worker reports of its unit."""
-        job = self.working.get(event["worker"])
+        worker = self.workers[event["worker"]]
+        job = worker.job
         if job is None or job.unit.key != event["unit"]:
             return
-        if event["what"] == "waits":
-            job.activity = "waits for another worker of its machine"
-        elif event["what"] == "adds_rounds":
-            self.watcher.adds_rounds(job.tasks[event["cell"]], event["rounds"])
-        else:
-            task, step = job.tasks[event["cell"]], Step(**event["step"])
-            job.activity = f"{step} of {task.cell.algorithm}"
-            if event["what"] == "starts":
-                self.watcher.starts(task, step)
-            else:
-                self.watcher.ends(task, step, event["seconds"])
-        self.machines[event["worker"]].at = f"{job.unit.mesh.name}: {job.activity}"
+        if event["at"]:
+            job.during = f" in {event['at']}"
+            worker.state.at = f"{job.unit.mesh.name}: {event['at']}"
+        if event["cell"]:
+            about = [Step(**one) if isinstance(one, dict) else one for one in event["about"]]
+            getattr(self.watcher, event["what"])(job.tasks[event["cell"]], *about)
 
-    def _end(self, future: Future) -> None:
-        """Save the records of a unit that is done."""
-        worker = next((w for w, job in self.working.items() if job.future is future), "")
-        if not worker:  # it was sent to another worker
+    def _end(self, worker: _Worker, future: Future) -> None:
+        """Save the records of a unit that is done, unless it was taken back."""
+        job = worker.job
+        if job is None or future is not job.future:
             return
-        if future.status == "error":
-            error = future.exception()
-            if isinstance(error, KilledWorker):
-                self._give_up(worker, error.allowed_failures + 1)
-                return
-            mesh, machine = self.working[worker].unit.mesh, self.machines[worker].machine
-            raise ClusterError(f"{mesh.name} cannot be measured on {machine}: {error}") from error
-        try:
-            answer = future.result(timeout=ARRIVES_WITHIN)
-        except (OSError, TimeoutError, FutureCancelledError):  # its worker has just ended
-            self._look()
-            if worker in self.working:
-                self._lose(worker)
+        error = future.exception() if future.status == "error" else None
+        if isinstance(error, KilledWorker):
+            self._give_up(worker, job, error.allowed_failures + 1)
+        elif error is not None:
+            name = job.unit.mesh.name
+            raise ClusterError(f"{name} cannot be measured on {worker.machine}: {error}") from error
         else:
-            self._save(worker, answer)
+            try:
+                answer = future.result(timeout=ARRIVES_WITHIN)
+            except (OSError, TimeoutError, CancelledError):  # its worker has just ended
+                self._look()
+                self._lose(worker)
+            else:
+                self._save(worker, job, answer)
 
-    def _save(self, worker: str, answer: Answer) -> None:
-        job, machine = self.working[worker], self.machines[worker]
+    def _save(self, worker: _Worker, job: _Job, answer: Answer) -> None:
         missing = dict(job.tasks)
         for content, uv in answer.records:
             try:
@@ -243,65 +250,64 @@ class _ClusterRun:
                 environment = answer.environments[record.environment]
             except (KeyError, ValidationError) as error:
                 raise ClusterError(
-                    f"{machine.machine} sent a record that cannot be used: {error}. Install the "
+                    f"{worker.machine} sent a record that cannot be used: {error}. Install the "
                     "same version of cembench on all machines."
                 ) from error
             self.recorder.save(task, record, uv, environment)
         if missing:
-            raise ClusterError(
-                f"{machine.machine} sent no record of {len(missing)} cells; run again."
-            )
-        machine.units += 1
-        self._count(worker)
+            raise ClusterError(f"{worker.machine} sent no record of {len(missing)} cells.")
+        worker.state.units += 1
+        self._count(worker, job)
         with suppress(Exception):  # it is deleted after some days anyway
-            self.client.run(forget, job.unit.key, workers=[worker], wait=False)
+            self.client.run(forget, job.unit.key, workers=[worker.address], wait=False)
 
-    def _lose(self, worker: str) -> None:
+    def _lose(self, worker: _Worker) -> None:
         """Take back the unit of a worker that is lost; give up one that has ended too many."""
-        job = self.working[worker]
-        future, job.future = job.future, None
+        job = worker.job
+        if job is None:
+            return
         with suppress(Exception):
-            self.client.cancel([future], force=True)
+            self.client.cancel([job.future], force=True)
         job.lost += 1
         if job.lost >= MOST_LOST:
-            self._give_up(worker, job.lost)
+            self._give_up(worker, job, job.lost)
             return
-        self.waiting.append(self.working.pop(worker))
+        worker.job = None
+        self.waiting.append(job)
         self.watcher.shows(
             f"{job.unit.mesh.name} ({job.unit.cells[0].solves}) is measured again: the worker on "
-            f"{self.machines[worker].machine} was lost{job.during}"
+            f"{worker.machine} was lost{job.during}"
         )
 
-    def _give_up(self, worker: str, lost: int) -> None:
+    def _give_up(self, worker: _Worker, job: _Job, lost: int) -> None:
         """Record the cells of a unit that ended its workers as failed."""
-        job, environment = self.working[worker], self.environments[worker]
         detail = (
             f"its surface ended {lost} workers that measured it, the last on "
-            f"{self.machines[worker].machine}{job.during}"
+            f"{worker.machine}{job.during}"
         )
         outcome = not_ok("failed", Fault(kind=FaultKind.WORKERS_LOST, detail=detail))
         for task in job.tasks.values():
-            record = record_of(task, outcome, environment["id"], now())
-            self.recorder.save(task, record, None, environment)
-        self._count(worker)
+            record = record_of(task, outcome, worker.environment["id"], now())
+            self.recorder.save(task, record, None, worker.environment)
+        self._count(worker, job)
 
-    def _count(self, worker: str) -> None:
-        """Count the unit of a worker as done."""
-        self.machines[worker].at = ""
-        self.done += self.working.pop(worker).seconds
+    def _count(self, worker: _Worker, job: _Job) -> None:
+        """Count a unit as done."""
+        worker.job, worker.state.at = None, ""
+        self.done += job.seconds
         self.state.done += 1
         self._save_state()
 
     def _save_state(self) -> None:
         """Save the progress; what is left takes as long for an expected second as what is done."""
-        left = sum(job.seconds for job in (*self.waiting, *self.working.values()))
-        self.state.machines = list(self.machines.values())
-        if self.done and self.connected:
-            self.state.seconds_left = (monotonic() - self.since) / self.done * left
+        left = sum(job.seconds for job in (*self.waiting, *self.sent))
+        self.state.machines = [worker.state for worker in self.workers.values()]
+        pace = (monotonic() - self.since) / self.done if self.done else None
+        self.state.seconds_left = pace and pace * left
         save_state(self.recorder.store.folder, self.state)
 
     def _look(self) -> None:
-        """Update the connected workers, and check that the run can go on.
+        """Update the workers, and check that the run can go on.
 
         Raises
         ------
@@ -310,80 +316,76 @@ class _ClusterRun:
 
         """
         self.looked = monotonic()
+        before = self._connected()
         try:
             if self.client.status != "running":
                 raise OSError(self.client.status)
-            there = set(self.client.nthreads())
-            if new := sorted(there - self.environments.keys()):
-                self._add_workers(new)
+            there = self.client.nthreads().keys()
+            self._add_workers(sorted(there - {worker.address for worker in before}))
         except (OSError, TimeoutError) as error:
-            left = len(self.waiting) + len(self.working)
             raise ClusterError(
-                f"the scheduler is gone; {self._finished}, {left} surfaces are left. Start a "
-                "scheduler and workers; the same command goes on."
+                f"the scheduler is gone; {self._finished}, {len(self.waiting) + len(self.sent)} "
+                "surfaces are left. Start a scheduler and workers; the same command goes on."
             ) from error
-        there &= self.environments.keys()
-        for worker in set(self.connected) - there:
-            self.machines[worker].lost = True
-            if worker in self.working:
+        for worker in self._connected():
+            if worker.address not in there:
+                worker.state.lost = True
                 self._lose(worker)
-        if self.connected != sorted(there):
-            self.connected = sorted(there)
-            self.watcher.machines([self.machines[worker].machine for worker in self.connected])
-        if there and there <= self.refused.keys():
-            raise ClusterError.about(
-                "no worker has the software of this machine ({differing}). Install the same on the "
-                "workers, or leave out {same_environment}.",
-                differing=self.refused[self.connected[-1]],
-            )
-        if there:
-            self.met = self.looked
-        else:
-            self._check_alone(self.looked - self.met)
+        connected = self._connected()
+        if connected != before:
+            self.watcher.machines([worker.machine for worker in connected])
+        self._check_workers(connected)
         self._save_state()
+
+    def _connected(self) -> list[_Worker]:
+        return [worker for worker in self.workers.values() if not worker.state.lost]
 
     def _add_workers(self, new: Sequence[str]) -> None:
         """Describe new workers; show once a machine if its software differs from the client's."""
+        if not new:
+            return
         answers = self.client.run(describe_environment, workers=new, on_error="return")
-        for worker, environment in answers.items():
+        for address, environment in answers.items():
             if isinstance(environment, OSError):  # it is gone again
                 continue
             if isinstance(environment, Exception):
                 raise ClusterError(
-                    f"the worker {worker} cannot measure: {environment}. Install the same version "
+                    f"the worker {address} cannot measure: {environment}. Install the same version "
                     "of cembench on all machines."
                 )
             machine = environment["machine"]
-            is_new = all(state.machine != machine for state in self.machines.values())
-            self.machines[worker] = MachineState(machine=machine)
-            self.environments[worker] = environment
-            others = "; ".join(differences(self.recorder.environment, environment))
-            if others and self.same_environment:
-                self.refused[worker] = f"{machine}: {others}"
-                self.watcher.shows(f"{machine} measures nothing: its software differs: {others}")
-            elif others and is_new:
-                self.watcher.shows(f"{machine} has other software: {others}")
+            differs = "; ".join(differences(self.recorder.environment, environment))
+            if differs and all(one.machine != machine for one in self.workers.values()):
+                refused = "measures nothing: its software differs"
+                how = refused if self.same_environment else "has other software"
+                self.watcher.shows(f"{machine} {how}: {differs}")
+            state = MachineState(machine=machine)
+            self.workers[address] = _Worker(address, environment, state, differs)
 
-    def _check_alone(self, seconds: float) -> None:
-        """Raise :class:`ClusterError` if no worker is there, and none is to be expected."""
-        cluster = self.client.cluster
-        if isinstance(cluster, LocalCluster) and seconds > LOCAL_PATIENCE:
+    def _check_workers(self, connected: Sequence[_Worker]) -> None:
+        """Raise :class:`ClusterError` if no worker measures, and none is to be expected."""
+        if self.same_environment and connected and all(one.differs for one in connected):
+            raise ClusterError.about(
+                "no worker has the software of this machine ({differing}). Install the same on the "
+                "workers, or leave out {same_environment}.",
+                differing=f"{connected[-1].machine}: {connected[-1].differs}",
+            )
+        cluster, alone = self.client.cluster, self.looked - self.met
+        if connected:
+            self.met = self.looked
+        elif isinstance(cluster, LocalCluster) and alone > LOCAL_PATIENCE:
             raise ClusterError(
                 f"all workers of this machine are gone, and none was restarted within "
                 f"{LOCAL_PATIENCE:g} s; {self._finished}. Check whether the memory suffices; "
                 "the same command goes on."
             )
-        refused = refusals(cluster)
-        if refused and len(refused) >= len(cluster.worker_spec):
+        elif (refused := refusals(cluster)) and len(refused) >= len(cluster.worker_spec):
             raise ClusterError.about(
                 "Slurm takes no job: {cause}; {kept}. Correct the settings in {cluster}; the same "
                 "command goes on.",
                 cause=refused[-1],
                 kept=self._finished,
             )
-        if seconds > _PATIENCE and not self.reported_alone:
-            self.reported_alone = True
-            self.watcher.shows("no worker is connected yet; waiting for one")
 
     @property
     def _finished(self) -> str:

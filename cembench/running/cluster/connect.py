@@ -155,15 +155,11 @@ def _client_of(address: str) -> Client:
 
     try:
         return Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
-    except (TypeError, RuntimeError) as error:  # raised by dask if certificates are missing
-        raise ClusterError(
-            f"{address} cannot be reached through TLS: {error}. Set {', '.join(TLS_VARIABLES)} to "
-            "the files of the certificates."
-        ) from error
-    except (OSError, TimeoutError, ValueError) as error:
+    except (OSError, RuntimeError, TimeoutError, TypeError, ValueError) as error:
         raise ClusterError(
             f"no scheduler answers at {address}: {error or 'timed out'}. Start one with `dask "
-            "scheduler`, and workers with `dask worker ADDRESS --nthreads 1`."
+            "scheduler`, and workers with `dask worker ADDRESS --nthreads 1`; for TLS, set "
+            f"{', '.join(TLS_VARIABLES)} to the files of the certificates."
         ) from error
 
 
@@ -202,21 +198,13 @@ def _job_class(refused: list[str]) -> type:
     from dask_jobqueue.slurm import SLURMJob
 
     class Job(SLURMJob):  # type: ignore[misc] # dask_jobqueue has no types
-        async def _submit_job(self, script: str) -> str | None:
+        async def _submit_job(self, script: str) -> str:
             try:
-                submitted: str = await super()._submit_job(script)
+                return str(await super()._submit_job(script))
             except (OSError, RuntimeError) as error:
                 refused.append(" ".join(str(error).split()))
-                return None
-            return submitted
-
-        def _job_id_from_submit_output(self, out: str | None) -> str | None:
-            return None if out is None else super()._job_id_from_submit_output(out)
-
-        @classmethod
-        async def _close_job(cls, job_id: str | None, cancel_command: str) -> None:
-            if job_id is not None:
-                await super()._close_job(job_id, cancel_command)
+                self.cancel_command = "true"
+                return "no job, number 0"
 
     return Job
 

@@ -113,24 +113,25 @@ class Forwarder(Watcher):
 
     def waits(self) -> None:
         """Forward that another worker of the machine measures; called every second."""
-        self._forward("waits")
+        self._forward("waits", None, at="waits for another worker of its machine")
 
     def adds_rounds(self, task: Task, rounds: int) -> None:
         """Forward the event to the client."""
-        self._forward("adds_rounds", cell=task.cell.label, rounds=rounds)
+        self._forward("adds_rounds", task, rounds)
 
     def starts(self, task: Task, step: Step) -> None:
         """Forward the event to the client."""
-        self._forward("starts", cell=task.cell.label, step=vars(step))
+        self._forward("starts", task, vars(step), at=f"{step} of {task.cell.algorithm}")
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Forward the event; of a cancelled unit nothing is saved that was stopped."""
-        self._forward("ends", cell=task.cell.label, step=vars(step), seconds=seconds)
+        self._forward("ends", task, vars(step), seconds)
 
-    def _forward(self, what: str, **about: Any) -> None:
+    def _forward(self, what: str, task: Task | None, *about: Any, at: str = "") -> None:
         if self.cancelled.is_set():
             raise ClusterError("the unit was cancelled: its client does not wait for it any more.")
-        self.send({"what": what, **about})
+        cell = task.cell.label if task else ""
+        self.send({"what": what, "cell": cell, "about": list(about), "at": at})
 
 
 def measure(unit: Unit, store: Store, forwarder: Forwarder) -> list[Record]:
