@@ -115,13 +115,14 @@ def _settings(text: str) -> dict[str, str]:
     given = dict(part.partition("=")[::2] for part in text.removeprefix("slurm:").split(","))
     chosen = {name: given.pop(name, usual) for name, (usual, *_) in SLURM.items()}
     problems = [f"{name!r} is unknown" for name in given]
-    for name, (_, pattern, meaning) in SLURM.items():
-        if not re.fullmatch(pattern, chosen[name] or ""):
-            problems.append(f"{name} is {'missing' if chosen[name] is None else meaning}")
+    for name, (_, pattern, _) in SLURM.items():
+        if (value := chosen[name]) is None:
+            problems.append(f"{name} is missing")
+        elif not re.fullmatch(pattern, value):
+            problems.append(f"{name}={value} cannot be read")
     if problems:
         meanings = "; ".join(f"{name}: {meaning}" for name, (*_, meaning) in SLURM.items())
-        allowed = f"write name=value, separated by commas. {meanings}."
-        raise _wrong(text, f"{problems[0]}: {allowed}")
+        raise _wrong(text, f"{problems[0]}: write name=value, separated by commas. {meanings}.")
     return {name: value or "" for name, value in chosen.items()}
 
 

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
+from types import SimpleNamespace
 
 import pytest
 from cembench.surfaces.cone import cone
@@ -163,6 +164,24 @@ def test_a_run_whose_own_workers_are_all_gone_ends_and_says_so(tmp_path, monkeyp
         pytest.raises(ClusterError, match="all workers of this machine are gone"),
     ):
         run_on_cluster(tasks_of("good", surfaces=SURFACES[:1]), Store(tmp_path), alone)
+
+
+def test_a_worker_that_comes_back_to_its_address_takes_part_again(tmp_path):
+    heard, addresses = [], ["tcp://here:1"]
+    described = {"id": "one", "machine": "here"}
+    client = SimpleNamespace(
+        status="running",
+        cluster=None,
+        nthreads=lambda: dict.fromkeys(addresses, 1),
+        run=lambda _, workers, **more: dict.fromkeys(workers, described),
+    )
+    watcher = SimpleNamespace(machines=heard.append)
+    recorder = SimpleNamespace(environment=described, watcher=watcher, store=Store(tmp_path))
+    run = module._ClusterRun(recorder, client, same_environment=False)
+    for there in (["tcp://here:1"], [], ["tcp://here:1"]):
+        addresses[:] = there
+        run._look()
+    assert heard == [["here"], [], ["here"]]
 
 
 def test_the_python_function_takes_a_client(client, tmp_path):
