@@ -73,13 +73,13 @@ BUDGETS = {
     "conformal": 6_530,
     "registry": 970,
     "results": 5_450,
-    "running": 7_830,
+    "running": 7_640,
     "drawing": 1_480,
     "report": 8_470,
     "validation": 2_520,
     "morphing": 1_350,
-    "api": 5_400,
-    "commands": 3_040,
+    "api": 5_500,
+    "commands": 3_130,
 }
 
 

@@ -289,6 +289,7 @@ def benchmark(
     reference: str | None = None,
     cluster: Client | str | None = None,
     same_environment: bool = False,
+    part: str | None = None,
     output: AnyPath | None = None,
     fresh: bool = False,
     rerun_failed: bool = False,
@@ -373,6 +374,9 @@ def benchmark(
         ``distributed.Client``.
     same_environment : bool
         Of a cluster, leave out machines with other software.
+    part : str, optional
+        Measure one of several parts, e.g. 3/20, with all algorithms of a surface in the same one.
+        `cembench merge` joins their folders: see docs/cluster.md.
     output : path, optional
         The run's folder; an existing run is resumed. Default in Python: a new temporary folder.
     fresh : bool
@@ -425,6 +429,7 @@ def benchmark(
         check_reference,
         chosen_algorithms,
         gather_sets,
+        part_of,
         read_surfaces,
     )
     from cembench.api.sets import exhibit_of
@@ -514,6 +519,7 @@ def benchmark(
     for policy in dict.fromkeys(solves):
         settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
         tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles, asked)
+    tasks = part_of(tasks, part) if part else tasks
     folder = Path(output or tempfile.mkdtemp(prefix="cembench-run-"))
     plan = Plan(tasks, Store(folder), options, cluster)
     if dry_run:

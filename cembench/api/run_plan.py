@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
@@ -12,7 +13,6 @@ from cembench.api.map_surfaces import local_files
 from cembench.api.sets import Gathered, gathered, surfaces_of_set
 from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError
-from cembench.core.extras import Extra, require
 from cembench.core.reporter import Reporter
 from cembench.core.wording import Advice, Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -23,7 +23,14 @@ from cembench.running.estimate import Estimate, estimate, planned_seconds
 from cembench.running.external.installed import missing
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import Provenance, Task, mesh_files, provenance_of, provenances
+from cembench.running.plan import (
+    Provenance,
+    Task,
+    comparable_groups,
+    mesh_files,
+    provenance_of,
+    provenances,
+)
 from cembench.running.surfaces import (
     generate_surface,
     is_generated,
@@ -132,20 +139,42 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
         raise ParameterError.about(
             "{pairing:'process'} is for runs on this machine; leave it out, or leave {cluster} out."
         )
-    from cembench.running.cluster.connect import MODULES, check_submits, parse_cluster
+    from cembench.running.cluster.connect import parse_cluster
 
     if not isinstance(cluster, str):
-        require(Extra.CLUSTER, "a run on a cluster", "dask", "distributed")
         return
     where = parse_cluster(cluster)
-    require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
-    check_submits(where)
+    where.check()
     if where.is_open:
         reporter.warn(
             f"{where.address} does not authenticate clients: anyone who can connect can run code "
             "as the users of its workers. Use tls://HOST:PORT (docs/cluster.md), or keep others "
             "off it."
         )
+
+
+def part_of(tasks: Sequence[Task], part: str) -> list[Task]:
+    """Return the cells of a part, such as "3/20"; cells that are compared are in the same one.
+
+    The surfaces are dealt out by their number of triangles, so that parts take alike.
+
+    Raises
+    ------
+    ParameterError
+        There is no such part.
+
+    """
+    number, count = map(int, part.split("/")) if re.fullmatch(r"\d+/\d+", part) else (0, 0)
+    groups = sorted(comparable_groups(tasks), key=lambda group: -group[0].facts.faces)
+    if not 1 <= number <= min(count, len(groups)):
+        raise ParameterError.about(
+            "{given} is not allowed; write 3/20 for the third of twenty parts. This plan can have "
+            "up to {most}, since a surface under a policy is measured as a whole.",
+            given=Setting("part", repr(part)),
+            most=len(groups),
+        )
+    chosen = {task.cell.label for group in groups[number - 1 :: count] for task in group}
+    return [task for task in tasks if task.cell.label in chosen]
 
 
 def read_surfaces(

@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     budget="--budget TIME",
     solves="--solves NAME",
     cluster="--cluster PLACE",
+    part="--part K/N",
 )
 def run(
     call: Call,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import heapq
+from bisect import bisect_left
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -28,30 +30,56 @@ def hours(
         seconds.
 
     """
-    from cembench.running.cluster.units import grouped, makespan, most_useful
     from cembench.running.estimate import planned_seconds
+    from cembench.running.plan import comparable_groups
 
     known = {id(task): cost for task, cost in zip(tasks, costs, strict=True) if cost is not None}
-    groups = grouped([task for task in tasks if id(task) in known])
-    priced = [[known[id(task)] for task in group] for group in groups]
-    whole = sum(one.seconds for group in priced for one in group)
-    by_workers: dict[int, float] = {}
+    groups = comparable_groups([task for task in tasks if id(task) in known])
+    units = [[known[id(task)] for task in group] for group in groups]
+    whole = [sum(cost.seconds for cost in unit) for unit in units]
+    by_machines: dict[int, float] = {}
     seconds: list[float] = []
     for machines in ESTIMATED_FOR:
-        share = None if budget is None else budget * machines / (whole or 1.0)
+        share = None if budget is None else budget * machines / (sum(whole) or 1.0)
         seconds = [
-            planned_seconds(g, None if share is None else share * sum(one.seconds for one in g))
-            for g in priced
+            planned_seconds(unit, None if share is None else share * alone)
+            for unit, alone in zip(units, whole, strict=True)
         ]
-        by_workers[machines] = makespan(seconds, machines)
-    longest = max(zip(seconds, groups, strict=True), key=lambda one: one[0], default=None)
+        by_machines[machines] = makespan(seconds, machines)
+    longest = max(range(len(units)), key=seconds.__getitem__, default=None)
     return {
-        "seconds": by_workers,
-        "units": len(groups),
+        "seconds": by_machines,
+        "units": len(units),
         "useful": most_useful(seconds),
-        "longest": None if longest is None else longest[1][0].cell.mesh,
-        "longest_seconds": None if longest is None else longest[0],
+        "longest": None if longest is None else groups[longest][0].cell.mesh,
+        "longest_seconds": None if longest is None else seconds[longest],
     }
+
+
+def makespan(seconds: Sequence[float], machines: int) -> float:
+    """Return the seconds that `machines` machines take for all units, longest first.
+
+    >>> makespan([3.0, 2.0, 2.0], 2)
+    4.0
+    """
+    free = [0.0] * machines
+    for one in sorted(seconds, reverse=True):
+        heapq.heappush(free, heapq.heappop(free) + one)
+    return max(free)
+
+
+def most_useful(seconds: Sequence[float]) -> int:
+    """Return the number of machines beyond which the run takes as long as its longest unit.
+
+    Differences below 1 % are ignored.
+
+    >>> most_useful([3.0, 2.0, 1.0])
+    2
+    """
+    longest = max(seconds, default=0.0)
+    numbers = range(1, len(seconds))
+    enough = bisect_left(numbers, True, key=lambda n: makespan(seconds, n) <= 1.01 * longest)
+    return min(len(seconds), 1 + enough)
 
 
 def show_hours(estimate: dict[str, Any]) -> None:

@@ -20,6 +20,7 @@ from cembench.mesh.files import (
 )
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
+from cembench.results.comparison import circumstances
 from cembench.results.papers import NO_PAPER, Paper
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
 from cembench.running.sources import hash_of, sources_of
@@ -136,6 +137,14 @@ def plan_cells(
             cell = cell_of(taker, mesh, arguments[taker.name], how, sources[taker.name])
             tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), sources[taker.name]))
     return tasks
+
+
+def comparable_groups(tasks: Sequence[Task]) -> list[list[Task]]:
+    """Return the tasks whose seconds are compared: same surface, policy, back end and threads."""
+    groups: dict[tuple[str, str], list[Task]] = {}
+    for task in tasks:
+        groups.setdefault((circumstances(task.cell), task.cell.mesh), []).append(task)
+    return list(groups.values())
 
 
 def cell_of(

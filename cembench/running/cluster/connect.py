@@ -12,7 +12,7 @@ import re
 import shutil
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -34,22 +34,17 @@ _PAGES = "127.0.0.1:0"
 TLS_VARIABLES = tuple(
     f"DASK_DISTRIBUTED__COMM__TLS__{name}" for name in ("CA_FILE", "CLIENT__KEY", "CLIENT__CERT")
 )
-#: The modules that each kind of cluster needs.
-MODULES: Mapping[str, tuple[str, ...]] = {
-    "address": ("dask", "distributed"),
-    "local": ("dask", "distributed", "cryptography"),
-    "slurm": ("dask", "distributed", "cryptography", "dask_jobqueue"),
-}
-#: The settings of ``slurm:``: name, default (None: required), and meaning.
-SLURM = {
-    "partition": (None, "partition (queue)"),
-    "cores": (None, "cores per machine"),
-    "memory": ("4GB", "memory per job, e.g. 60GB"),
-    "machines": ("1", "number of jobs at a time, one per machine"),
-    "walltime": ("12:00:00", "time limit of a job, hours:minutes:seconds"),
-    "account": ("", "account to charge"),
-    "exclusive": ("yes", "yes or no: exclusive nodes"),
-    "interface": ("", "network interface, e.g. ib0"),
+_NUMBER = r"[1-9]\d{0,4}"
+#: The settings of ``slurm:``: default (None: required), pattern, and meaning.
+SLURM: Mapping[str, tuple[str | None, str, str]] = {
+    "partition": (None, ".+", "partition (queue)"),
+    "cores": (None, _NUMBER, "cores per machine, a positive whole number"),
+    "memory": ("4GB", ".+", "memory per job, e.g. 60GB"),
+    "machines": ("1", _NUMBER, "number of jobs at a time, one per machine"),
+    "walltime": ("12:00:00", ".+", "time limit of a job, hours:minutes:seconds"),
+    "account": ("", ".*", "account to charge"),
+    "exclusive": ("yes", "yes|no", "yes or no: exclusive nodes"),
+    "interface": ("", ".*", "network interface, e.g. ib0"),
 }
 #: Settings of dask that switch off its profiling of workers, which would disturb measurements.
 #: docs/cluster.md has them for workers that users start.
@@ -67,6 +62,15 @@ class ClusterPlace:
     address: str = ""
     workers: int = 0
     settings: Mapping[str, str] = field(default_factory=dict)
+
+    def check(self) -> None:
+        """Check that what is needed is installed; no job is submitted."""
+        require(Extra.CLUSTER, "a run on a cluster")
+        if self.kind == "slurm" and shutil.which(SUBMIT) is None:
+            raise ClusterError(
+                f"{SUBMIT} is not on this machine, so no job of Slurm can be submitted from it. "
+                "Use a login node, or name another cluster (docs/cluster.md)."
+            )
 
     @property
     def is_open(self) -> bool:
@@ -89,14 +93,12 @@ def parse_cluster(text: str) -> ClusterPlace:
     4
 
     """
-    local = _LOCAL.fullmatch(text)
-    if local:
+    if local := _LOCAL.fullmatch(text):
         return ClusterPlace("local", workers=int(local[1]))
     if _ADDRESS.fullmatch(text):
         return ClusterPlace("address", address=text)
-    kind, colon, rest = text.partition(":")
-    if kind == "slurm" and colon:
-        return ClusterPlace("slurm", settings=_settings(rest))
+    if text.startswith("slurm:"):
+        return ClusterPlace("slurm", settings=_settings(text))
     raise _wrong(
         text,
         "write local:4 (workers on this machine), tls://HOST:8786 or tcp://HOST:8786 (a running "
@@ -110,27 +112,18 @@ def _wrong(text: str, allowed: str) -> ParameterError:
 
 
 def _settings(text: str) -> dict[str, str]:
-    settings: dict[str, str] = {}
-    for part in text.split(","):
-        name, equals, value = part.partition("=")
-        if not equals or name not in SLURM or not value:
-            raise _wrong(f"slurm:{text}", f"{part!r} is unknown: {_allowed()}")
-        settings[name] = value
-    missing = [name for name, (usual, _) in SLURM.items() if usual is None and name not in settings]
-    if missing:
-        raise _wrong(f"slurm:{text}", f"{missing[0]} is missing: {_allowed()}")
-    settings = {name: settings.get(name, usual or "") for name, (usual, _) in SLURM.items()}
-    for name in ("cores", "machines"):
-        if not re.fullmatch(r"[1-9]\d{0,4}", settings[name]):
-            raise _wrong(f"slurm:{text}", f"{name} is a positive whole number: {_allowed()}")
-    if settings["exclusive"] not in ("yes", "no"):
-        raise _wrong(f"slurm:{text}", f"exclusive is yes or no: {_allowed()}")
-    return settings
-
-
-def _allowed() -> str:
-    meanings = "; ".join(f"{name}: {meaning}" for name, (_, meaning) in SLURM.items())
-    return f"write name=value, separated by commas. {meanings}."
+    given = dict(part.partition("=")[::2] for part in text.removeprefix("slurm:").split(","))
+    chosen = {name: given.pop(name, usual) for name, (usual, *_) in SLURM.items()}
+    problems = [f"{name!r} is unknown" for name in given]
+    for name, (_, pattern, _) in SLURM.items():
+        if (value := chosen[name]) is None:
+            problems.append(f"{name} is missing")
+        elif not re.fullmatch(pattern, value):
+            problems.append(f"{name}={value} cannot be read")
+    if problems:
+        meanings = "; ".join(f"{name}: {meaning}" for name, (*_, meaning) in SLURM.items())
+        raise _wrong(text, f"{problems[0]}: write name=value, separated by commas. {meanings}.")
+    return {name: value or "" for name, value in chosen.items()}
 
 
 @contextmanager
@@ -145,33 +138,30 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
         The scheduler cannot be reached.
 
     """
-    require(Extra.CLUSTER, "a run on a cluster", *MODULES[where.kind])
+    where.check()
     import dask
     from distributed import Client
 
-    if where.kind == "address":
-        try:
-            client = Client(where.address, timeout=CONNECT_SECONDS, set_as_default=False)
-        except (TypeError, RuntimeError) as error:  # raised by dask if certificates are missing
-            raise ClusterError(
-                f"{where.address} cannot be reached through TLS: {error}. Set "
-                f"{', '.join(TLS_VARIABLES)} to the files of the certificates."
-            ) from error
-        except (OSError, TimeoutError, ValueError) as error:
-            raise ClusterError(
-                f"no scheduler answers at {where.address}: {error or 'timed out'}. Start one with "
-                "`dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`."
-            ) from error
-        with client:
-            yield client
-        return
-    # The first worker that is lost with a unit may be a coincidence; the second is its fault.
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1, **QUIET}),
-        _local(where) if where.kind == "local" else _slurm(where) as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
+    with dask.config.set(QUIET), ExitStack() as stack:
+        if where.kind == "address":
+            client = _client_of(where.address)
+        else:
+            start = _local if where.kind == "local" else _slurm
+            client = Client(stack.enter_context(start(where)), set_as_default=False)
+        yield stack.enter_context(client)
+
+
+def _client_of(address: str) -> Client:
+    from distributed import Client
+
+    try:
+        return Client(address, timeout=CONNECT_SECONDS, set_as_default=False)
+    except (OSError, RuntimeError, TimeoutError, TypeError, ValueError) as error:
+        raise ClusterError(
+            f"no scheduler answers at {address}: {error or 'timed out'}. Start one with `dask "
+            "scheduler`, and workers with `dask worker ADDRESS --nthreads 1`; for TLS, set "
+            f"{', '.join(TLS_VARIABLES)} to the files of the certificates."
+        ) from error
 
 
 def quiet_variables() -> dict[str, str]:
@@ -199,15 +189,6 @@ def _local(where: ClusterPlace) -> Any:
     )
 
 
-def check_submits(where: ClusterPlace) -> None:
-    """Raise :class:`ClusterError` if jobs cannot be submitted from this machine."""
-    if where.kind == "slurm" and shutil.which(SUBMIT) is None:
-        raise ClusterError(
-            f"{SUBMIT} is not on this machine, so no job of Slurm can be submitted from it. Use a "
-            "login node, or name another cluster (docs/cluster.md)."
-        )
-
-
 def refusals(cluster: Any) -> Sequence[str]:
     """Return what Slurm said of the jobs that it refused, one for each."""
     return getattr(cluster, "refusals", ())
@@ -218,21 +199,13 @@ def _job_class(refused: list[str]) -> type:
     from dask_jobqueue.slurm import SLURMJob
 
     class Job(SLURMJob):  # type: ignore[misc] # dask_jobqueue has no types
-        async def _submit_job(self, script: str) -> str | None:
+        async def _submit_job(self, script: str) -> str:
             try:
-                submitted: str = await super()._submit_job(script)
+                return str(await super()._submit_job(script))
             except (OSError, RuntimeError) as error:
                 refused.append(" ".join(str(error).split()))
-                return None
-            return submitted
-
-        def _job_id_from_submit_output(self, out: str | None) -> str | None:
-            return None if out is None else super()._job_id_from_submit_output(out)
-
-        @classmethod
-        async def _close_job(cls, job_id: str | None, cancel_command: str) -> None:
-            if job_id is not None:
-                await super()._close_job(job_id, cancel_command)
+                self.cancel_command = "true"
+                return "no job, number 0"
 
     return Job
 

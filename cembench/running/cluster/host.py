@@ -17,7 +17,6 @@ from cembench.running.environment import machine_name
 
 #: Days after which unused files are deleted from a machine.
 KEPT_DAYS = 14.0
-_CLEARED = ("units", "plugins", "slurm")
 #: Seconds between two attempts to take the lock of a machine.
 LOOK_EVERY = 1.0
 
@@ -28,17 +27,6 @@ def machine_lock(waiting: Callable[[], None]) -> Iterator[None]:
 
     `waiting` is called every second while another worker holds the lock; it may raise. The system
     releases the lock of a process that is killed.
-
-    Raises
-    ------
-    ClusterError
-        The lock cannot be opened.
-
-    Examples
-    --------
-    >>> with machine_lock(lambda: None):
-    ...     pass
-
     """
     path = place() / "locks" / f"{file_name(machine_name())}.lock"
     try:
@@ -78,7 +66,7 @@ def forget_unit(key: str) -> None:
 def clear_old(days: float = KEPT_DAYS) -> None:
     """Delete units and plug-ins that have not been used for a number of days."""
     since = time() - 86400 * days
-    for old in (old for name in _CLEARED for old in place().glob(f"{name}/*")):
+    for old in (old for name in ("units", "plugins", "slurm") for old in place().glob(f"{name}/*")):
         with suppress(OSError):
             if old.stat().st_mtime < since:
                 shutil.rmtree(old) if old.is_dir() else old.unlink()

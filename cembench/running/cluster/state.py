@@ -32,7 +32,7 @@ class ClusterState(BaseModel):
     units: Count
     done: Count = 0
     machines: list[MachineState] = []
-    #: None before the first unit is done, and where no machine is there.
+    #: None before the first unit is done.
     seconds_left: Seconds | None = None
     written_at: str = ""
 

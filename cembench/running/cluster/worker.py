@@ -1,8 +1,7 @@
-"""Measure units in a dask worker, and return their records.
+"""Measure a unit in a dask worker, and return its records.
 
 A worker does what :func:`~cembench.running.local.run_tasks` does on one machine: algorithms are
-called in processes of their own, which end with the worker. A thread looks whether the client still
-waits for the unit, and stops the process that runs if it does not.
+called in processes of their own, which end with the worker.
 """
 
 from __future__ import annotations
@@ -12,9 +11,8 @@ import os
 import signal
 import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -28,39 +26,25 @@ from numpy.typing import NDArray
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
-from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Record
 from cembench.results.store import Store
 from cembench.running.cluster import host
-from cembench.running.cluster.units import PluginFiles, Unit
-from cembench.running.environment import describe_environment, importing, machine_name, usable_cores
+from cembench.running.cluster.units import Unit
+from cembench.running.environment import importing, machine_name, usable_cores
 from cembench.running.local import run_tasks
-from cembench.running.options import Options
 from cembench.running.plan import Task
 from cembench.running.sources import hash_of, sources_of
 from cembench.running.timing import CellTimer
 from cembench.running.watcher import Step, Watcher
-from cembench.running.worker import MESH_TYPES
-
-LOOK_EVERY = 1.0
-#: The folder of the unit's own run, in the unit's folder.
-RUN = "run"
-Arrays = tuple[NDArray[np.float64], NDArray[np.int64]]
-#: Sends an event to the client.
-Send = Callable[[Mapping[str, Any]], None]
 
 
 @dataclass(frozen=True)
 class Answer:
-    """The records of a unit."""
+    """The records of a unit: their files, each with its map, and the environments by id."""
 
-    #: The address of the worker.
-    worker: str
-    #: The files of the records, each with its map.
-    records: Sequence[tuple[bytes, NDArray[np.complex128] | None]] = ()
-    #: By their ids.
-    environments: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    records: Sequence[tuple[bytes, NDArray[np.complex128] | None]]
+    environments: Mapping[str, dict[str, Any]]
 
 
 def dask_setup(worker: Any) -> None:
@@ -68,10 +52,8 @@ def dask_setup(worker: Any) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
-def measure_unit(text: str, plugins: PluginFiles, surface: Arrays, topic: str) -> Answer:
-    """Measure a unit, given as JSON, and send events to the topic; run by a dask worker.
-
-    `surface` is V and F of the unit's surface.
+def measure_unit(unit: Unit, topic: str) -> Answer:
+    """Measure a unit in a dask worker, and send events to the topic.
 
     Raises
     ------
@@ -86,30 +68,21 @@ def measure_unit(text: str, plugins: PluginFiles, surface: Arrays, topic: str) -
         state = worker.state.tasks.get(key)
         return state is not None and state.state in ("executing", "long-running")
 
-    unit = Unit.model_validate_json(text)
     origin = {"unit": unit.key, "worker": worker.address}
-    forwarder = Forwarder(lambda event: worker.log_event(topic, {**origin, **event}))
+    forwarder = Forwarder(lambda event: worker.log_event(topic, {**origin, **event}), is_wanted)
     _unset_dask_variables()
-    with _cancelling(forwarder.cancelled, is_wanted), host.machine_lock(forwarder.waits):
+    with host.machine_lock(forwarder.waits):
         host.clear_old()
+        store = Store(host.unit_folder(unit.key) / "run")
         try:
-            mesh = surface_of(unit, surface)
-            forwarder.send({"what": "takes"})
-            placed = unit.model_copy(update={"plugins": _placed(unit.plugins, plugins)})
-            store = Store(host.unit_folder(unit.key) / RUN)
-            measure(placed, mesh, store, forwarder)
+            measure(unit, store, forwarder)
         except CembenchError:
             raise
         except Exception:  # perhaps of a class that the client cannot unpickle
             raise ClusterError(traceback.format_exc()) from None
         files = [(cell, store.record_file(cell)) for cell in unit.cells]
         records = [(read_bytes(file), store.uv(cell)) for cell, file in files if is_there(file)]
-        return Answer(worker.address, records, store.environments())
-
-
-def describe_worker() -> dict[str, Any]:
-    """Return the environment of this worker, with the libraries loaded that measure."""
-    return describe_environment()
+        return Answer(records, store.environments())
 
 
 async def forget(key: str) -> None:
@@ -117,67 +90,68 @@ async def forget(key: str) -> None:
     host.forget_unit(key)
 
 
+class Cancelled(threading.Event):
+    """An event that is set as soon as the client no longer waits for the unit."""
+
+    def __init__(self, is_wanted: Callable[[], bool]) -> None:
+        super().__init__()
+        self.is_wanted = is_wanted
+
+    def is_set(self) -> bool:
+        """Whether it is set."""
+        return super().is_set() or not self.is_wanted()
+
+
 class Forwarder(Watcher):
     """Forwards the progress of a unit to the client, until the unit is cancelled."""
 
-    def __init__(self, send: Send) -> None:
+    def __init__(
+        self, send: Callable[[Mapping[str, Any]], None], is_wanted: Callable[[], bool]
+    ) -> None:
         self.send = send
-        self.cancelled = threading.Event()
+        self.cancelled = Cancelled(is_wanted)
 
     def waits(self) -> None:
         """Forward that another worker of the machine measures; called every second."""
-        self._forward("queues")
+        self._forward("waits", None, at="waits for another worker of its machine")
 
     def adds_rounds(self, task: Task, rounds: int) -> None:
         """Forward the event to the client."""
-        self._forward("adds_rounds", cell=task.cell.label, rounds=rounds)
+        self._forward("adds_rounds", task, rounds)
 
     def starts(self, task: Task, step: Step) -> None:
         """Forward the event to the client."""
-        self._forward("starts", cell=task.cell.label, step=vars(step))
+        self._forward("starts", task, vars(step), at=f"{step} of {task.cell.algorithm}")
 
     def ends(self, task: Task, step: Step, seconds: float) -> None:
         """Forward the event; of a cancelled unit nothing is saved that was stopped."""
-        self._forward("ends", cell=task.cell.label, step=vars(step), seconds=seconds)
+        self._forward("ends", task, vars(step), seconds)
 
-    def _forward(self, what: str, **about: Any) -> None:
+    def _forward(self, what: str, task: Task | None, *about: Any, at: str = "") -> None:
         if self.cancelled.is_set():
             raise ClusterError("the unit was cancelled: its client does not wait for it any more.")
-        self.send({"what": what, **about})
+        cell = task.cell.label if task else ""
+        self.send({"what": what, "cell": cell, "about": list(about), "at": at})
 
 
-@contextmanager
-def _cancelling(cancelled: threading.Event, is_wanted: Callable[[], bool]) -> Iterator[None]:
-    """Set the event as soon as the client cancels the unit that is measured in this block."""
-    ended = threading.Event()
-
-    def look() -> None:
-        while not ended.wait(LOOK_EVERY):
-            if not is_wanted():
-                cancelled.set()
-                return
-
-    thread = threading.Thread(target=look, daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        ended.set()
-        thread.join()
-
-
-def measure(unit: Unit, mesh: TriangleMesh, store: Store, forwarder: Forwarder) -> list[Record]:
+def measure(unit: Unit, store: Store, forwarder: Forwarder) -> list[Record]:
     """Measure a unit, or resume it if the store has a part of it; return its records.
 
     Raises
     ------
     ClusterError
-        The machine has other code than the client, or the unit was cancelled.
+        The surface arrived damaged, the machine has other code than the client, or the unit was
+        cancelled.
 
     """
+    plugins = tuple(_placed(name, files) for name, files in unit.plugins.items())
+    for array in (unit.mesh.V, unit.mesh.F):
+        array.setflags(write=False)
     tasks = []
     for cell in unit.cells:
-        algorithm = _algorithm(cell.algorithm, unit.plugins)
+        if unit.mesh.hash != cell.mesh_hash:
+            raise ClusterError(f"the surface {cell.mesh} arrived damaged; run again.")
+        algorithm = _algorithm(cell.algorithm, plugins)
         sources = sources_of(algorithm)
         if hash_of(sources) != cell.code_hash:
             raise ClusterError(
@@ -185,12 +159,17 @@ def measure(unit: Unit, mesh: TriangleMesh, store: Store, forwarder: Forwarder) 
                 f"{', '.join(sources)} differ. Install the same version of cembench and of "
                 "plug-ins on all machines."
             )
-        tasks.append(Task(cell, algorithm, mesh, unit.facts, unit.plugins, sources))
-
-    def timer(scratch: Path, options: Options) -> CellTimer:
-        return CellTimer(scratch, options, stopped=forwarder.cancelled)
-
-    return run_tasks(tasks, store, _options(unit), forwarder, timer)
+        tasks.append(Task(cell, algorithm, unit.mesh, unit.facts, plugins, sources))
+    free = int(0.9 * psutil.virtual_memory().available)
+    options = replace(
+        unit.options,
+        memory_bytes=unit.options.memory_bytes or free,
+        jobs=min(unit.options.jobs, usable_cores()),
+    )
+    return run_tasks(
+        *(tasks, store, options, forwarder),
+        lambda scratch, options: CellTimer(scratch, options, stopped=forwarder.cancelled),
+    )
 
 
 @cache
@@ -200,48 +179,19 @@ def _algorithm(name: str, plugins: tuple[str, ...]) -> Algorithm:
         return load_algorithm(name, plugins)
 
 
-def _options(unit: Unit) -> Options:
-    """Return the options of the run, bounded by the memory and the cores of this machine."""
-    options = unit.run_options()
-    free = int(0.9 * psutil.virtual_memory().available)
-    jobs = min(options.jobs, usable_cores())
-    return replace(options, memory_bytes=options.memory_bytes or free, jobs=jobs)
-
-
-def surface_of(unit: Unit, arrays: Arrays) -> TriangleMesh:
-    """Return the surface of a unit from V and F as they arrived.
-
-    Raises
-    ------
-    ClusterError
-        They are not those of the unit's surface, to the last bit.
-
-    """
-    mesh = MESH_TYPES[unit.mesh_type].trusted(*arrays, unit.mesh, unit.notices)
-    if mesh.hash != unit.mesh_hash:
-        raise ClusterError(f"the surface {unit.mesh} arrived damaged; run again.")
-    mesh.V.setflags(write=False)
-    mesh.F.setflags(write=False)
-    return mesh
-
-
-def _placed(plugins: tuple[str, ...], files: PluginFiles) -> tuple[str, ...]:
-    """Write the files of plug-ins to a folder named by their content; return the new names."""
-    placed = []
-    for plugin in plugins:
-        if plugin not in files:
-            placed.append(plugin)
-            continue
-        digest = hashlib.sha256()
-        for name, content in sorted(files[plugin].items()):
-            digest.update(f"{name} {len(content)} ".encode() + content)
-        folder = host.place() / "plugins" / digest.hexdigest()[:24]
-        for name, content in files[plugin].items():
-            path = folder / name
-            if not path.is_file() or read_bytes(path) != content:
-                write_bytes(path, content)
-        placed.append(str(folder / Path(plugin).name))
-    return tuple(placed)
+def _placed(plugin: str, files: Mapping[str, bytes]) -> str:
+    """Write the files of a plug-in to a folder named by their content; return its new name."""
+    if not files:
+        return plugin
+    digest = hashlib.sha256()
+    for name, content in sorted(files.items()):
+        digest.update(f"{name} {len(content)} ".encode() + content)
+    folder = host.place() / "plugins" / digest.hexdigest()[:24]
+    for name, content in files.items():
+        path = folder / name
+        if not path.is_file() or read_bytes(path) != content:
+            write_bytes(path, content)
+    return str(folder / Path(plugin).name)
 
 
 def _unset_dask_variables() -> None:

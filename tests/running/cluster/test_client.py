@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 from time import monotonic
+from types import SimpleNamespace
 
 import pytest
 from cembench.surfaces.cone import cone
@@ -81,12 +82,7 @@ def test_two_workers_give_the_same_maps_and_statuses_as_one_process(client, tmp_
     assert again.steps == []
 
 
-@pytest.mark.parametrize("look_every", [module.LOOK_EVERY, 15.0], ids=["looks", "hears-first"])
-def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(
-    client, tmp_path, monkeypatch, look_every
-):
-    """A restarted worker may report that it took the unit before it was seen to be there."""
-    monkeypatch.setattr(module, "LOOK_EVERY", look_every)
+def test_a_unit_that_ends_two_workers_is_recorded_and_the_rest_measured(client, tmp_path):
     deadly = tasks_of("ends-the-worker", surfaces=SURFACES[:1], plugin=DEADLY)
     tasks = [*deadly, *tasks_of("good", surfaces=SURFACES[1:])]
     store, heard = Store(tmp_path), Listener()
@@ -134,7 +130,7 @@ def test_a_worker_without_cembench_ends_the_run_and_says_so(client, tmp_path, mo
     def fails():
         raise ModuleNotFoundError("No module named 'cembench'")
 
-    monkeypatch.setattr(module, "describe_worker", fails)
+    monkeypatch.setattr(module, "describe_environment", fails)
     with pytest.raises(ClusterError, match=r"cannot measure: No module named .*\. Install"):
         run_on_cluster(tasks_of("good"), Store(tmp_path), client)
 
@@ -168,6 +164,24 @@ def test_a_run_whose_own_workers_are_all_gone_ends_and_says_so(tmp_path, monkeyp
         pytest.raises(ClusterError, match="all workers of this machine are gone"),
     ):
         run_on_cluster(tasks_of("good", surfaces=SURFACES[:1]), Store(tmp_path), alone)
+
+
+def test_a_worker_that_comes_back_to_its_address_takes_part_again(tmp_path):
+    heard, addresses = [], ["tcp://here:1"]
+    described = {"id": "one", "machine": "here"}
+    client = SimpleNamespace(
+        status="running",
+        cluster=None,
+        nthreads=lambda: dict.fromkeys(addresses, 1),
+        run=lambda _, workers, **more: dict.fromkeys(workers, described),
+    )
+    watcher = SimpleNamespace(machines=heard.append)
+    recorder = SimpleNamespace(environment=described, watcher=watcher, store=Store(tmp_path))
+    run = module._ClusterRun(recorder, client, same_environment=False)
+    for there in (["tcp://here:1"], [], ["tcp://here:1"]):
+        addresses[:] = there
+        run._look()
+    assert heard == [["here"], [], ["here"]]
 
 
 def test_the_python_function_takes_a_client(client, tmp_path):

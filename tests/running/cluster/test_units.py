@@ -1,6 +1,7 @@
 """What travels, and the machine that it travels to; no scheduler takes part."""
 
 import json
+import pickle
 import sys
 import threading
 from dataclasses import replace
@@ -9,7 +10,7 @@ from pathlib import Path
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
 
-from cembench.commands.cluster import hours, show_hours
+from cembench.commands.cluster import hours, makespan, show_hours
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.registry import load_registry
 from cembench.results.machines import differences
@@ -17,16 +18,16 @@ from cembench.results.store import Store
 from cembench.running.cluster import host
 from cembench.running.cluster.connect import parse_cluster, quiet_variables
 from cembench.running.cluster.state import ClusterState, MachineState, read_state, save_state
-from cembench.running.cluster.units import Unit, grouped, makespan, parcel
+from cembench.running.cluster.units import pack
 from cembench.running.environment import MACHINE_VARIABLE, describe_environment
 from cembench.running.estimate import Estimate
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
-from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.plan import MeasurementSettings, comparable_groups, plan_cells
 from tests.running.test_local import FAULTY, tasks_of
 
 pytest.importorskip("distributed", reason="the extra [cluster] is not installed")
-from cembench.running.cluster.worker import Forwarder, measure, surface_of
+from cembench.running.cluster.worker import Forwarder, measure
 
 NO_TOKEN = "0" * 32
 
@@ -48,7 +49,7 @@ def two_surfaces(*policies):
 
 
 def test_a_unit_is_a_surface_under_a_policy_with_all_algorithms():
-    groups = grouped(two_surfaces("reuse", "backslash"))
+    groups = comparable_groups(two_surfaces("reuse", "backslash"))
     assert len(groups) == 4
     for group in groups:
         assert [task.cell.algorithm for task in group] == ["harmonic-circle", "lscm"]
@@ -56,12 +57,11 @@ def test_a_unit_is_a_surface_under_a_policy_with_all_algorithms():
 
 
 def test_a_unit_is_the_same_after_it_was_sent():
-    one = parcel(tasks_of("good"), NO_TOKEN, Options(timeout=5, seed=3)).unit
-    sent = Unit.model_validate_json(one.model_dump_json())
-    assert sent == one
-    assert sent.key == one.key
-    assert sent.run_options() == Options(timeout=5, seed=3)
-    assert parcel(tasks_of("good"), "1" * 32, Options(timeout=5, seed=3)).unit.key != one.key
+    one = pack(tasks_of("good"), NO_TOKEN, Options(timeout=5, seed=3))
+    sent = pickle.loads(pickle.dumps(one))
+    assert (sent.key, sent.cells, sent.options) == (one.key, one.cells, Options(timeout=5, seed=3))
+    assert sent.mesh.hash == one.mesh.hash
+    assert pack(tasks_of("good"), "1" * 32, Options(timeout=5, seed=3)).key != one.key
 
 
 def test_a_plug_in_travels_with_all_files_that_its_code_is_known_by(tmp_path, monkeypatch):
@@ -80,11 +80,11 @@ def test_a_plug_in_travels_with_all_files_that_its_code_is_known_by(tmp_path, mo
         MeasurementSettings(repeats=1),
         [str(plugin), "json:loads"],
     )
-    one = parcel(tasks, NO_TOKEN, Options())
-    assert {name: set(files) for name, files in one.plugin_files.items()} == {
-        str(plugin): {"mine.py", "beside.py"}
+    sent = pack(tasks, NO_TOKEN, Options()).plugins
+    assert {name: set(files) for name, files in sent.items()} == {
+        str(plugin): {"mine.py", "beside.py"},
+        "json:loads": set(),
     }
-    assert one.unit.plugins == (str(plugin), "json:loads")
 
 
 @pytest.mark.parametrize(("machines", "seconds"), [(1, 12.0), (2, 6.0), (3, 5.0), (100, 5.0)])
@@ -177,10 +177,10 @@ def test_what_nobody_came_back_for_is_deleted():
 
 def test_a_unit_comes_to_the_same_as_on_one_machine(tmp_path):
     tasks = tasks_of("good", "nan")
-    unit = parcel(tasks, NO_TOKEN, Options()).unit
+    unit = pack(tasks, NO_TOKEN, Options())
     collected = []
     store = Store(tmp_path / "there")
-    there = measure(unit, tasks[0].mesh, store, Forwarder(collected.append))
+    there = measure(unit, store, Forwarder(collected.append, lambda: True))
     assert [store.find(task.cell) for task in tasks] == there
     records = run_tasks(tasks, Store(tmp_path / "here"))
     for a, b in zip(there, records, strict=True):
@@ -195,20 +195,19 @@ def test_other_code_under_the_same_name_is_refused(tmp_path):
         replace(task, cell=task.cell.model_copy(update={"code_hash": "0" * 64}))
         for task in tasks_of("good")
     ]
-    unit = parcel(tasks, NO_TOKEN, Options()).unit
+    unit = pack(tasks, NO_TOKEN, Options())
     with pytest.raises(ClusterError, match=r"good has other code on .* faulty.py"):
-        measure(unit, tasks[0].mesh, Store(tmp_path), Forwarder(lambda event: None))
+        measure(unit, Store(tmp_path), Forwarder(lambda event: None, lambda: True))
 
 
-def test_a_surface_that_arrives_damaged_is_refused():
+def test_a_surface_that_arrives_damaged_is_refused(tmp_path):
     (task,) = tasks_of("good")
-    unit = parcel([task], NO_TOKEN, Options()).unit
-    V, F = task.mesh.V, task.mesh.F
+    unit = pack([task], NO_TOKEN, Options())
+    mesh = type(task.mesh).trusted(task.mesh.V + 1, task.mesh.F, task.mesh.name)
     with pytest.raises(ClusterError, match="arrived damaged"):
-        surface_of(unit, (V + 1, F))
-    mesh = surface_of(unit, (V, F))
-    assert mesh.hash == task.mesh.hash
-    assert not mesh.V.flags.writeable
+        measure(
+            replace(unit, mesh=mesh), Store(tmp_path), Forwarder(lambda event: None, lambda: True)
+        )
 
 
 def test_differences_of_software_name_library_and_versions():
@@ -235,11 +234,11 @@ def test_how_far_a_run_is_can_be_read_again(tmp_path):
 
 
 def test_what_is_kept_of_a_unit_counts_under_another_share_of_the_budget():
-    one = parcel(tasks_of("good"), NO_TOKEN, Options(budget=5.0)).unit
-    other = parcel(tasks_of("good"), NO_TOKEN, Options(budget=7.0)).unit
+    one = pack(tasks_of("good"), NO_TOKEN, Options(budget=5.0))
+    other = pack(tasks_of("good"), NO_TOKEN, Options(budget=7.0))
     assert one.options != other.options
     assert one.key == other.key
-    assert parcel(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).unit.key != one.key
+    assert pack(tasks_of("nan"), NO_TOKEN, Options(budget=5.0)).key != one.key
 
 
 def test_the_page_names_how_dask_is_kept_quiet():

@@ -10,7 +10,7 @@ pytest.importorskip("distributed", reason="the extra [cluster] is not installed"
 from cembench.core.errors import ClusterError
 from cembench.results.store import Store
 from cembench.running.cluster import worker
-from cembench.running.cluster.units import parcel
+from cembench.running.cluster.units import pack
 from cembench.running.cluster.worker import Forwarder, measure
 from cembench.running.options import Options
 from tests.running.cluster.test_units import NO_TOKEN
@@ -22,31 +22,19 @@ def test_a_cancelled_unit_ends_at_once_and_saves_nothing_that_was_stopped(
     tmp_path, monkeypatch, jobs
 ):
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr(worker, "LOOK_EVERY", 0.05)
     tasks = tasks_of("sleeps", "spins")
-    unit = parcel(tasks, NO_TOKEN, Options(jobs=jobs)).unit
+    unit = pack(tasks, NO_TOKEN, Options(jobs=jobs))
     started = threading.Event()
 
     def send(event):
         if event["what"] == "starts":
             started.set()
 
-    forwarder = Forwarder(send)
-    with (
-        pytest.raises(ClusterError, match="cancelled"),
-        worker._cancelling(forwarder.cancelled, lambda: not started.is_set()),
-    ):
-        measure(unit, tasks[0].mesh, Store(tmp_path / "run"), forwarder)
+    forwarder = Forwarder(send, lambda: not started.is_set())
+    with pytest.raises(ClusterError, match="cancelled"):
+        measure(unit, Store(tmp_path / "run"), forwarder)
     assert Store(tmp_path / "run").finished() == []
     assert list((tmp_path / "run").glob("samples/*/*.jsonl")) == []
-
-
-def test_a_unit_that_is_wanted_is_not_cancelled(monkeypatch):
-    monkeypatch.setattr(worker, "LOOK_EVERY", 0.0)
-    cancelled, looked = threading.Event(), threading.Event()
-    with worker._cancelling(cancelled, lambda: looked.set() or True):
-        assert looked.wait(30)
-    assert not cancelled.is_set()
 
 
 def test_settings_that_dask_made_for_a_worker_are_not_inherited_by_what_it_measures(monkeypatch):
