@@ -24,10 +24,8 @@ from cembench.running.map_promises import faults
 #: Two of a kind are measured once.
 LEFT_OUT = ("chinese_lion.mat",)
 FOLDERS = (".", "stress")
-#: The figure whose tables stand on the page of the algorithms.
-FIRST = "mean"
-#: The figure whose tables stand on the page of the field; others are in the file beside it.
-SECOND, FILE = "mu", "docs/field.csv"
+#: The figure whose tables the page of the algorithms has; the others are in a file beside it.
+SHOWN, FILE = "mean", "docs/field.csv"
 #: The tables of each target: figure and heading; E_C of disks in one gauge.
 TABLES = {
     "disk": {
@@ -45,7 +43,7 @@ TABLES = {
 }
 
 
-def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9) -> list[Section]:
+def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9) -> Section:
     """Call every algorithm for disks once on the meshes of a folder.
 
     For what a map is: its status and figures. `stress` in the folder is read too. With --results,
@@ -66,16 +64,14 @@ def field(folder: Path, *, results: Path | None = None, most_faces: int = 10**9)
                 row["maps"][spec.name] = figures(spec, mesh)
                 if results:
                     write_text(results, json.dumps(measured, indent=1))
-    first: list[Table | str] = []
-    second: list[Table | str] = []
+    shown: list[Table | str] = []
     others = []
     for figure, heading, table in tables(measured, algorithms()):
-        if figure in (FIRST, SECOND):
-            (first if figure == FIRST else second).extend([heading, table])
+        if figure == SHOWN:
+            shown.extend([heading, table])
         else:
             others.append((heading.strip("*"), table))
-    file = {FILE: lines_of(others)}
-    return [Section(first, "docs/algorithms.md"), Section(second, "docs/field.md", file)]
+    return Section(shown, "docs/algorithms.md", {FILE: lines_of(others)})
 
 
 def lines_of(chosen: list[tuple[str, Table]]) -> str:

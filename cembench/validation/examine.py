@@ -43,7 +43,7 @@ from cembench.validation.scaling import (
     sizes,
 )
 from cembench.validation.sizes import keeps_its_quality
-from cembench.validation.solver import Call, Solver
+from cembench.validation.solver import Call, CheckedMap, Solver, worst_of
 from cembench.validation.verdict import Requirement, Validation, unmet
 
 #: Reference for growth, whatever the baselines are: its seconds grow linearly at most.
@@ -96,8 +96,8 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
-    seen: list[int] = []
-    solver = replace(solver, call=_noting_sizes(solver.call, seen))
+    maps: list[CheckedMap] = []
+    solver = replace(solver, call=_noting_maps(solver.call, maps))
     if algorithm.target == "atlas":
         raise ParameterError(
             f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
@@ -124,14 +124,16 @@ def examine(
             skipped[stage] = f"not examined, because of a fault in {fault}"
         else:
             work.hooks.stage(stage)
+            maps.clear()
             checked, figures, records = examined(work)
             findings += checked
             parts |= figures
             measured += records
+            seen = [one.mesh.m for one in maps if one.uv is not None]
             seen += [record.mesh.faces for record in records if record.outcome.metrics]
             if seen:
                 looked_at[stage] = min(seen), max(seen)
-            seen.clear()
+            parts["worst"] = worst_of(maps) or parts.get("worst")
     validation = Validation(
         algorithm=algorithm.name,
         title=algorithm.title,
@@ -155,13 +157,12 @@ def examine(
     return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
 
 
-def _noting_sizes(call: Call, faces: list[int]) -> Call:
-    """Return the call, which then notes the number of triangles of each surface it maps."""
+def _noting_maps(call: Call, maps: list[CheckedMap]) -> Call:
+    """Return the call, which then notes each surface with its map."""
 
     def noting(task: Task) -> tuple[Outcome, Complex | None]:
-        outcome, uv = call(task)
-        faces.extend([] if uv is None else [task.mesh.m])
-        return outcome, uv
+        maps.append(CheckedMap(task.mesh, *call(task)))
+        return maps[-1].outcome, maps[-1].uv
 
     return noting
 

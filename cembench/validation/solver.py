@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -17,21 +17,25 @@ from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, Task, plan_cells
 from cembench.running.plugins import load_with_plugins
 
+#: The figure by which a map is the worst.
+ANGLE = "angle_error_mean_deg"
 Call = Callable[[Task], tuple[Outcome, Complex | None]]
 
 
 @dataclass(frozen=True)
 class CheckedMap:
-    """A surface, the outcome of the call, and the map if there is one."""
+    """A surface, the outcome of the call, and the map, if there is a finite one of its shape."""
 
     mesh: TriangleMesh
     outcome: Outcome
     uv: Complex | None
 
-    @property
-    def is_usable(self) -> bool:
-        """Whether there is a finite map of the right shape and type."""
-        return self.uv is not None
+
+def worst_of(maps: Iterable[CheckedMap]) -> CheckedMap | None:
+    """Return the map with the largest mean angle error; None if there is no map."""
+    known = [(one.outcome.metrics.get(ANGLE), one) for one in maps if one.uv is not None]
+    errors = [(error, k) for k, (error, _) in enumerate(known) if error is not None]
+    return known[max(errors)[1]][1] if errors else None
 
 
 def in_a_process(options: Options) -> Call:

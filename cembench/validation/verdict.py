@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from typing import Any, get_args
 
-from pydantic import BaseModel, ConfigDict
+from pydantic import BaseModel, ConfigDict, Field
 
 from cembench.results.comparison import Comparison
 from cembench.results.records import Printable
@@ -17,6 +17,7 @@ from cembench.validation.finding import Stage, ValidationFinding
 from cembench.validation.quality import BaselineComparison, PairedComparison
 from cembench.validation.scaling import GrowthAnswer, GrowthComparison
 from cembench.validation.sizes import is_higher_at_last, looked_at_words, ratios_by_size
+from cembench.validation.solver import CheckedMap
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
 
@@ -34,7 +35,7 @@ class Requirement(StrEnum):
 class Validation(BaseModel):
     """The result of validating one algorithm."""
 
-    model_config = ConfigDict(frozen=True)
+    model_config = ConfigDict(frozen=True, arbitrary_types_allowed=True)
 
     algorithm: str
     title: str
@@ -64,6 +65,8 @@ class Validation(BaseModel):
     #: Requirements that were asked for and are not met.
     unmet: tuple[Requirement, ...] = ()
     seconds: float = 0.0
+    #: The map of the last stage of checks with the largest angle errors, for the page.
+    worst: CheckedMap | None = Field(default=None, exclude=True, repr=False)
 
     @property
     def faults(self) -> tuple[ValidationFinding, ...]:

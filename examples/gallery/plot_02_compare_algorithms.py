@@ -14,7 +14,7 @@ from cembench.conformal.metrics import angle_errors
 # %%
 # Four maps to the disk. Each is checked: a map with a fold, or off the circle, would be an error.
 
-surface = cembench.surface("left-hand-stand-in", 6_000)
+surface = cembench.surface("liu-smile-face-stand-in", 6_000)
 names = ["harmonic-circle", "cem", "ldm", "direct-cem"]
 results = {name: cembench.parameterize(surface, name) for name in names}
 

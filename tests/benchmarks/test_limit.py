@@ -7,17 +7,15 @@ from benchmarks.measuring import exponent, read_surface
 
 
 @pytest.mark.parametrize("clock", ["wall", "cpu"])
-def test_a_small_surface_fills_a_line_of_each_table(clock):
+def test_a_small_surface_fills_a_line(clock):
     one = measure("600", 2, clock)
     names = {*FLOORS, *METHODS}
-    assert set(one["seconds"]) == set(one["ratios"]) == set(one["peak_gib"]) == names
+    assert set(one["seconds"]) == set(one["ratios"]) == names
     assert one["ratios"]["limit"] == 1
     assert one["iterations"]["cem, 2 iterations"] == 2
     assert min(one["seconds"].values()) > 0
     lines = "\n".join(map(str, tables([one]))).splitlines()
     assert f"| 600 ({one['boundary']}) | {one['faces']} | " in lines[2]
-    assert sum("| direct-cem |" in line for line in lines) == 1
-    assert one["direct"]["factorisation"] > one["direct"]["boundary last"]
     assert not any("power" in line for line in lines)
 
 

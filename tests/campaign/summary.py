@@ -16,33 +16,30 @@ from tests.campaign.journal import Entry
 #: Title of a table, the part it is of, and what its rows are.
 TABLES: tuple[tuple[str, str, str, Callable[[Entry], str]], ...] = (
     ("Files by format", "files", "format", lambda e: e.family),
-    ("Meshes by family", "meshes", "family", lambda e: e.family),
     ("Meshes by algorithm", "meshes", "algorithm", lambda e: e.case.partition("/")[2]),
     ("Kills by verb", "kills", "verb", lambda e: e.family),
 )
 
 ORACLES = """\
-**Files** are small legal meshes of every format, with what exporters write besides (normals,
-colours, texture coordinates, comments, further elements), then damaged by one to three mutations:
-cut, bits flipped, lines and words doubled, left out and exchanged, numbers and counts replaced,
-byte order, encoding. Each is read in a limited process. It must give a mesh or an error of the
-project with a message; one in twenty is also given to `cembench map`. A reader of the campaign's
-own, written from the format's specification and sharing no code with the package, must find the
-same numbers of vertices and triangles, and the same corners. Where it finds the file damaged, the
-package must refuse it ("silent loss" otherwise). Files that were left legal must be read.
+**Files** are small legal meshes of every format, with what exporters add (normals, colours, texture
+coordinates, comments), damaged by one to three mutations: cut, bits flipped, lines and words
+doubled, dropped or swapped, numbers, byte order or encoding changed. Reading a file in a limited
+process must give a mesh, or an error of the project with a message; one in twenty is also given to
+`cembench map`. An independent reader, written from the specification, must find the same corners.
+A file that it finds damaged must be refused; a file that is still legal must be read.
 
-**Meshes** go through every registered algorithm that takes them, judged as `run` judges a cell. For
-a map that is "ok", rational arithmetic, without rounding, must find every triangle
-counter-clockwise, the boundary on the unit circle and once round it in order, the winding number 1
-about triangles' centres, and hole boundaries inside, not crossing, their circles disjoint. A free
-boundary may overlap itself if a note says so. For one mesh in four, energy and angles are computed
-again with fifty digits. Refused is a surface that is no clean manifold; skipped is one of a
-topology that the algorithm does not take.
+**Meshes** (flat triangles, needles, slivers, spikes, combs, mazes, spirals, pinched and crowded
+boundaries, close holes, coordinates far away, huge or tiny, and others) go through every registered
+algorithm that takes them, judged as `run` judges a cell. For a map that is "ok", rational
+arithmetic must confirm that every triangle is counter-clockwise, that the boundary goes round the
+unit circle once and in order, and that holes are disjoint and inside. For one mesh in four, energy
+and angles are computed again with fifty digits. "Refused": the surface is not a clean manifold;
+"skipped": the algorithm does not take its topology.
 
-**Kills** end a verb by SIGKILL at a random moment of its duration, in a folder full of files that
-look like the package's own. After the kill, and after a second call, all of these have the same
-bytes, mode and time; what was finished is unchanged; and in the end the folder holds the same names
-as after a call that nobody disturbed. "Had ended": the verb was faster than the kill.
+**Kills** end a verb by SIGKILL at a random moment, in a folder full of files that look like the
+package's own. After the kill, and after a second call, these are unchanged, finished work is
+unchanged, and the folder holds the names that an undisturbed call leaves. "Had ended": the verb
+was faster than the kill.
 """
 
 
@@ -70,8 +67,8 @@ def write_page(path: Path, entries: Sequence[Entry], about: dict[str, object]) -
     lines = [
         "# Robustness",
         "",
-        "What `make fuzz` tried, and what became of it. This page is written by the command:",
-        "`python -m tests.campaign --write-docs`.",
+        "What `make fuzz` tried, and what became of it, as written by `python -m tests.campaign "
+        "--write-docs`.",
         "",
         f"{datetime.date.today().isoformat()}, commit {_commit()}, seed {about['seed']}. "
         f"**{len(entries):,} cases, {wrong:,} faults.**",

@@ -1,5 +1,6 @@
 """What README and the start pages tell people to type works after `pip install .` alone."""
 
+import os
 import re
 import shlex
 import subprocess
@@ -14,12 +15,13 @@ from cembench.core.extras import MODULES
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs/start").glob("*.md"))]
 #: What needs a network, minutes, or an extra, and says so on its page.
-ELSEWHERE = (
-    *("fetch", "reproduce", "--dataset", "left-hand", "--set", "theory", "--profile", "--command"),
-    *("--html", "human-face"),
-)
-#: The algorithm of README, which other lines of it use.
+ELSEWHERE = ("fetch", "reproduce", "--dataset", "left-hand", "--profile", "human-face")
+#: The file of the algorithm that a page has; that of README where it has none.
 SOLVER = "mine.py"
+#: The program that a page names.
+PROGRAM = f"""#!/bin/sh
+exec {shlex.quote(sys.executable)} -m cembench map "$1" -o "$3" -a harmonic-circle --uv disk
+"""
 #: Variables that examples take for granted, as files or arrays.
 GIVEN = """
 import cembench
@@ -42,6 +44,11 @@ def commands(page):
     return [line for line in typed if not any(word in line for word in ELSEWHERE)]
 
 
+def solver_of(page):
+    """The algorithm that a page writes; nothing where it has none."""
+    return "\n".join(code for code in blocks(page, "python") if "@algorithm(" in code)
+
+
 @pytest.fixture
 def bare(tmp_path):
     """A folder with the files that the pages name, and what runs Python without any extra."""
@@ -53,12 +60,11 @@ def bare(tmp_path):
     disk = cembench.surface("hemi-ellipsoid", 400)
     for name in ("face", "scan", "head", "torus", "meshes/one"):
         cembench.write_mesh(tmp_path / f"{name}.obj", disk)
-    (solver,) = (code for code in blocks(ROOT / "README.md", "python") if "@algorithm(" in code)
-    (tmp_path / SOLVER).write_text(solver)
+    (tmp_path / SOLVER).write_text(solver_of(ROOT / "README.md"))
+    (tmp_path / "mysolver").write_text(PROGRAM)
+    (tmp_path / "mysolver").chmod(0o755)
 
     def run(*words):
-        import os
-
         environment = os.environ | {"PYTHONPATH": str(tmp_path / "site")}
         return subprocess.run(
             [sys.executable, *words],
@@ -86,9 +92,20 @@ def test_every_command_of_a_page_works_in_the_default_installation(page, bare):
 @pytest.mark.slow
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_every_python_of_a_page_works_in_the_default_installation(page, bare):
-    code = [one for one in blocks(page, "python") if "@algorithm(" not in one]
-    done = bare("-c", "\n".join([GIVEN, *code]))
+    done = bare("-c", "\n".join([GIVEN, *blocks(page, "python"), 'print("to the end")']))
     assert not done.returncode, done.stderr
+    assert done.stdout.endswith("to the end\n")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in PAGES if solver_of(p)], ids=lambda page: page.stem)
+def test_the_algorithm_of_a_page_maps_a_surface(page, bare, tmp_path):
+    (tmp_path / SOLVER).write_text(solver_of(page))
+    done = bare(
+        "-m", "cembench", *["map", "face.obj", "--plugin", "mine.py", "-a", "mine", "-o", "uv.obj"]
+    )
+    assert not done.returncode, done.stderr
+    assert "vt " in (tmp_path / "uv.obj").read_text()
 
 
 def test_a_report_needs_no_extra_and_has_still_plots(bare):

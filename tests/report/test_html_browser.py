@@ -323,6 +323,14 @@ def test_a_wide_table_fits_a_desktop_and_keeps_its_first_column_on_a_telephone(p
     assert first[1] < 0.4 * own[1]
 
 
+def test_the_headings_of_the_first_table_wrap_so_that_its_last_column_is_seen(page):
+    page.open(size=(1440, 900))
+    scroll = "document.querySelector('.findings .scroll')"
+    assert page.run(f"return {scroll}.scrollWidth <= {scroll}.clientWidth")
+    style = f"getComputedStyle({scroll}.querySelector('.sort'))"
+    assert page.run(f"return {style}.whiteSpace") == "normal"
+
+
 def filtered(page, *choices):
     """Choose in the filter, as a reader does."""
     if not page.one("#filter").is_displayed():

@@ -65,6 +65,14 @@ def test_a_fault_is_printed_with_what_is_allowed_and_what_to_do(here):
     assert "not examined" in (here.folder / "there/index.html").read_text()
 
 
+@pytest.mark.parametrize("name", ["not-conformal", "fold"])
+def test_a_page_has_a_picture_of_the_worst_map_though_nothing_was_timed(here, name):
+    code, _, _ = here(name, "--checks-only", "-o", "there")
+    assert code == 1
+    assert "its worst map" in (here.folder / "there/index.html").read_text()
+    assert (here.folder / "there/figures/worst-map.png").stat().st_size > 1000
+
+
 def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
     named = ("--surfaces", "hemi-ellipsoid,cone,flat-disk", *TINY[2:4], "--repeats", 1)
     required = ("--require", "no-folds", "--require", "not-worse")
