@@ -144,7 +144,7 @@ def test_seams_are_found_where_a_file_has_copies_of_vertices(tmp_path):
     corners[V[F][:, :, 0].mean(axis=1) < 2] += [0, 3]
     z = corners.reshape(-1, 2) @ [1, 1j]
     soup = Soup.of_triangles(V, F, z, np.arange(F.size).reshape(-1, 3))
-    for name in ("a.obj", "a.ply", "a.npz"):
+    for name in ("a.obj", "a.ply", "a.npz", "a.glb", "a.vtp"):
         write_soup(tmp_path / name, soup)
         m = cembench.measure(tmp_path / name).metrics
         assert (m["islands"], len(F)) == (2, 32)

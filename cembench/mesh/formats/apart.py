@@ -29,9 +29,9 @@ from cembench.core.loading import free_memory, read_arrays
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, damaged
 
-Reader = Callable[[Path], Soup]
+Reader = Callable[..., Soup]
 
-_SOUP, _ERROR = "soup.npz", "error.txt"
+_SOUP, _ERROR, _UV = "soup.npz", "error.txt", ("uv", "uv_index")
 #: Exit code of a process in which a reader ran out of memory.
 _NO_MEMORY = 12
 #: Seconds that a library has for any file, and more for each megabyte: a hundred times the usual.
@@ -41,15 +41,17 @@ _SECONDS, _SECONDS_PER_MB = 120.0, 10.0
 def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
     """Return a reader that calls this one in another process; its library is of an extra.
 
+    With `uv=True` it reads texture coordinates, too.
+
     The reader raises :class:`MissingExtra` where neither it nor the other library is installed.
     """
 
-    def read(path: Path) -> Soup:
+    def read(path: Path, *, uv: bool = False) -> Soup:
         if not other or find_spec(other) is None:
             require(extra, f"reading {path.suffix} files", module)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            reads = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            reads = [reader.__module__, reader.__name__, str(path.absolute()), name, *(["uv"] * uv)]
             command = [sys.executable, "-P", "-m", __name__, *reads]
             nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
             most = _SECONDS + _SECONDS_PER_MB * path.stat().st_size / 1e6
@@ -63,7 +65,7 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
             if (folder / _ERROR).exists():
                 raise MeshError((folder / _ERROR).read_text(encoding="utf-8"))
             if ended.returncode == 0:
-                return _soup(folder / _SOUP)
+                return _soup(folder / _SOUP, uv=uv)
         if ended.returncode == _NO_MEMORY:
             raise MemoryError
         how = f"code {ended.returncode}"
@@ -77,24 +79,35 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
     return read
 
 
-def _soup(file: Path) -> Soup:
+def _soup(file: Path, *, uv: bool) -> Soup:
     try:
-        arrays = read_arrays(file, ("V", "corners", "sizes", "notices"))
+        arrays = read_arrays(file, ("V", "corners", "sizes", "notices", *(_UV if uv else ())))
     except RecordError as error:
         raise MeshError(str(error)) from error
     pairs = json.loads(str(arrays["notices"]))
     notices = tuple(Notice(NoticeKind(kind), text) for kind, text in pairs)
-    return Soup(arrays["V"], arrays["corners"], arrays["sizes"], notices=notices)
+    return Soup(
+        arrays["V"],
+        arrays["corners"],
+        arrays["sizes"],
+        notices=notices,
+        uv=arrays.get("uv"),
+        uv_index=arrays.get("uv_index"),
+    )
 
 
-def _main(module: str, reader: str, path: str, folder: str) -> int:
+def _main(module: str, reader: str, path: str, folder: str, *uv: str) -> int:
     """Call a reader, and write its surface or the words of its error to a folder."""
     read: Reader = getattr(import_module(module), reader)
     _bound_memory()
     try:
-        soup = read(Path(path))
+        soup = read(Path(path), **dict.fromkeys(uv, True))
         notices = np.array(json.dumps([(notice.kind, notice.text) for notice in soup.notices]))
         fields = {"V": soup.V, "corners": soup.corners, "sizes": soup.sizes, "notices": notices}
+        if uv:
+            none = np.empty(0, dtype=np.complex128)
+            fields["uv"] = none if soup.uv is None else soup.uv
+            fields["uv_index"] = soup.corners if soup.uv_index is None else soup.uv_index
         write(Path(folder) / _SOUP, lambda file: np.savez(file, allow_pickle=False, **fields))
     except MeshError as error:
         write_text(Path(folder) / _ERROR, str(error))

@@ -16,17 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.soup import Soup, Texture, columns, damaged, in_single_precision
+from cembench.mesh.soup import Soup, Texture, columns, complex_of, damaged, in_single_precision
 
 _FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
     5126, 5125, 34962, 34963, 10497, 9729, 9987,
 )  # fmt: skip
 
 
-def read(path: Path) -> Soup:
+def read(path: Path, *, uv: bool = False) -> Soup:
     """Read all triangles of a scene; vertices at the same position become one vertex.
 
     glTF has a vertex for each texture coordinate or normal, so seams would cut the surface open.
+    With `uv` the first texture coordinates of each are read, too.
     """
     import trimesh
 
@@ -49,10 +50,17 @@ def read(path: Path) -> Soup:
     F = np.concatenate(
         [np.asarray(m.faces, dtype=np.int64) + at for m, at in zip(meshes, first, strict=False)]
     )
+    more: dict[str, Any] = {}
+    if uv and (given := [getattr(mesh.visual, "uv", None) for mesh in meshes]):
+        blank = [np.full((len(mesh.vertices), 2), np.nan) for mesh in meshes]
+        pairs = zip(given, blank, strict=True)
+        found = [none if one is None or len(one) != len(none) else one for one, none in pairs]
+        if np.isfinite(every := np.concatenate(found)).any():
+            more = {"uv": complex_of(every), "uv_index": F.ravel()}
     apart, same = np.unique(V, axis=0, return_inverse=True)
     if len(apart) < len(V):
         V, F = apart, same.reshape(-1)[F]
-    return Soup.from_arrays(V, F, np.full(len(F), 3), notices=notices)
+    return Soup.from_arrays(V, F, np.full(len(F), 3), notices=notices, **more)
 
 
 def write(*surfaces: Soup, texture: Texture | None = None) -> bytes:

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra, command
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.soup import Soup, columns, damaged
+from cembench.mesh.soup import Soup, columns, complex_of, damaged
 
 #: meshio's names of planar cells with corners in cyclic order.
 _POLYGONS = ("triangle", "quad", "polygon")
@@ -62,8 +62,11 @@ _SOLID = (
 )
 
 
-def read(path: Path) -> Soup:
+def read(path: Path, *, uv: bool = False) -> Soup:
     """Read the faces of a file; other cells, such as lines and tetrahedra, give a notice.
+
+    With `uv` the texture coordinates of points are read, too, by VTK.
+
 
     Raises
     ------
@@ -73,7 +76,11 @@ def read(path: Path) -> Soup:
     """
     kind = _data_set(path)
     refused: MeshError | None = None
-    if find_spec("meshio") and (path.suffix.lower() == ".vtu" or kind == "UNSTRUCTURED_GRID"):
+    if (
+        not uv
+        and find_spec("meshio")
+        and (path.suffix.lower() == ".vtu" or kind == "UNSTRUCTURED_GRID")
+    ):
         try:
             return read_by_meshio(path)
         except MeshError as error:
@@ -138,7 +145,10 @@ def _by_vtk(path: Path) -> Soup:
     if not faces and ignored:
         raise MeshError(f"it holds only cells {', '.join(ignored)}: {_SOLID}.")
     corners = np.concatenate([*faces, []]).astype(np.int64)
-    return Soup.from_arrays(V, corners, [len(face) for face in faces], notices=_ignored(ignored))
+    given = data.GetPointData().GetTCoords()
+    uv = None if given is None else complex_of(vtk_to_numpy(given)[:, :2])
+    sizes = [len(face) for face in faces]
+    return Soup.from_arrays(V, corners, sizes, notices=_ignored(ignored), uv=uv)
 
 
 def _faces(corners: list[int], kind: int) -> list[list[int]]:
