@@ -9,6 +9,7 @@ from typing import Annotated, TypeVar
 from pydantic import Field
 
 from cembench.conformal.fold_repair import accepted_repair
+from cembench.conformal.free_boundary import with_area_pi
 from cembench.conformal.planar import bounds_once
 from cembench.core.arrays import Complex
 from cembench.core.parameterization import Parameterization
@@ -103,7 +104,9 @@ def _in_the_plane(
     made = best_of(mesh, tiers, work, _overlap, repair=repair)
     if made.extras["chosen"] not in tiers[-1]:
         return made
-    return replace(made, extras=made.extras | {"instead_of": "a map with a free boundary"})
+    uv, folds = with_area_pi(mesh, made.uv, repair=repair)  # rounding folds what is thin
+    extras = made.extras | folds | {"instead_of": "a map with a free boundary"}
+    return replace(made, uv=uv, extras=extras)
 
 
 def _overlap(mesh: TriangleMesh, z: Complex) -> str:

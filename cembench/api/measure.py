@@ -2,126 +2,16 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
-from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from cembench.conformal.metrics import surface_areas
-from cembench.conformal.texel_density import density_words, texture_words
 from cembench.core.arguments import checked
-from cembench.core.arrays import Indices, Real
-from cembench.core.errors import CembenchError, MeshError
 from cembench.core.reporter import SILENT, Reporter
-from cembench.mesh.triangle_mesh import TriangleMesh
 
 if TYPE_CHECKING:
-    from cembench.conformal.atlas import AtlasFigures, CutMap
-    from cembench.conformal.uv_quality import Place
+    from numpy.typing import ArrayLike
+
+    from cembench.api.measurement import Measurement
     from cembench.running.surfaces import SurfaceInput
-
-#: Maximum number of pieces that are mapped anew, the largest first.
-MOST_PIECES = 50
-#: Share of the surface that must be mapped anew for a comparison.
-COMPARABLE = 0.95
-#: What is mapped anew.
-ISLANDS, WHOLE = "the same islands", "the surface without seams"
-#: Where images overlap.
-OVERLAPS = {
-    "overlap_inside_islands": "inside islands",
-    "overlap_between_islands": "between islands",
-}
-
-
-@dataclass(frozen=True)
-class Best:
-    """The best map of the same islands, or of the surface without seams.
-
-    Parameters
-    ----------
-    angle_error_mean_deg : float
-        Mean angle error in degrees, over all triangles that were mapped.
-    texel_density_ratio : float
-        Largest over smallest texel density, in one texture where islands get the area they have on
-        the surface.
-    share : float
-        Share of the surface that was mapped.
-
-    """
-
-    angle_error_mean_deg: float
-    texel_density_ratio: float
-    share: float
-
-
-@dataclass(frozen=True)
-class Measurement:
-    """The figures of given UVs.
-
-    Parameters
-    ----------
-    mesh : TriangleMesh
-        The surface.
-    cut : CutMap
-        The surface cut along the seams, with its islands.
-    metrics : mapping of str to float
-        Figures by name: those of every map, islands and seams, overlaps, tiles, stretch. None if
-        one is infinite.
-    islands : tuple of mapping
-        The same of each island, in the order of their numbers.
-    worst : tuple of Place
-        The triangles of the largest dilatation, apart from each other.
-    notices : tuple of str
-        What was left out, and what the UVs lack.
-    best : mapping of str to Best
-        With `against`: the best map of "the same islands" and of "the surface without seams", if
-        one was found.
-
-    """
-
-    mesh: TriangleMesh
-    cut: CutMap
-    metrics: Mapping[str, float | int | None]
-    islands: tuple[Mapping[str, Any], ...]
-    worst: tuple[Place, ...]
-    notices: tuple[str, ...] = ()
-    best: Mapping[str, Best] = field(default_factory=dict)
-
-    @cached_property
-    def verdict(self) -> str:
-        """The figures in one sentence, and what seams bought and a better solver would gain."""
-        return " ".join([_sentence(self), *([_compared(self)] if self.best else [])])
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return everything as data for JSON."""
-        best = {name: asdict(one) for name, one in self.best.items()}
-        return {
-            "surface": self.mesh.name,
-            "verdict": self.verdict,
-            **self.metrics,
-            "worst": [asdict(place) for place in self.worst],
-            "best": best,
-            "notices": list(self.notices),
-            "by_island": [dict(one) for one in self.islands],
-        }
-
-    def plot(self, path: str | os.PathLike[str]) -> Path:
-        """Draw the surface and its UVs, coloured by the angle error, into a PNG file."""
-        from cembench.drawing.preview import write_distortion
-        from cembench.drawing.scene import folded_by
-
-        folded = folded_by(self.cut.uv, self.cut.surface.F)
-        words = (self.mesh.name, self.verdict)
-        write_distortion(self.cut.surface, self.cut.given, folded, Path(path), words)
-        return Path(path)
-
-    def __repr__(self) -> str:
-        return f"<Measurement of {self.mesh.name}: {self.verdict}>"
 
 
 @checked
@@ -170,104 +60,6 @@ def measure(
     4.0
 
     """
-    from cembench.conformal.atlas import AtlasFigures, cut_map, metrics_of
-    from cembench.conformal.uv_quality import layout_metrics, stretch_metrics, worst_places
-    from cembench.running.given_uvs import surface_and_uv
+    from cembench.api.measurement import measured
 
-    mesh, corners, notices = surface_and_uv(surface, faces_and_uv)
-    figures = AtlasFigures(cut_map(mesh, corners))
-    with np.errstate(all="ignore"):
-        layout, islands = layout_metrics(figures)
-        values = metrics_of(figures) | stretch_metrics(figures) | layout
-        worst = worst_places(figures)
-    metrics = {name: value if np.isfinite(value) else None for name, value in values.items()}
-    best = _best(figures, mesh, reporter) if against else {}
-    return Measurement(mesh, figures.cut, metrics, tuple(islands), worst, notices, best)
-
-
-def _best(figures: AtlasFigures, mesh: TriangleMesh, reporter: Reporter) -> dict[str, Best]:
-    """Map the islands, and the surface without seams, anew."""
-    from cembench.mesh.topology import components
-
-    with reporter.busy("mapping the islands anew") as say:
-        cut = figures.cut
-        islands = _mapped(cut.surface, cut.island, figures.areas)
-        say("mapping the surface without seams")
-        whole = _mapped(mesh, components(mesh.F, mesh.n)[1][mesh.F[:, 0]], figures.areas)
-    return {name: one for name, one in ((ISLANDS, islands), (WHOLE, whole)) if one is not None}
-
-
-def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
-    """Map the largest pieces of a surface, given by each triangle's number (m,)."""
-    from cembench.api.parameterize import parameterize
-    from cembench.conformal.metrics import angle_errors
-    from cembench.conformal.planar import signed_areas
-    from cembench.conformal.texel_density import texel_density_ratio
-    from cembench.running.surfaces import load_surface
-
-    errors, spaces, images = list[Real](), list[Real](), list[Real]()
-    for number in np.argsort(-np.bincount(piece, areas))[:MOST_PIECES]:
-        used, F = np.unique(mesh.F[piece == number], return_inverse=True)
-        arrays = (mesh.V[used], F.reshape(-1, 3))
-        try:
-            try:
-                one: TriangleMesh = load_surface(arrays)
-            except MeshError:
-                one = load_surface(arrays, cut=True)
-            found = parameterize(one, check="fast")
-        except CembenchError:
-            continue  # not mapped, which the share says
-        errors.append(angle_errors(found.mesh, found.z).mean(axis=1))
-        spaces.append(surface_areas(found.mesh))
-        image = signed_areas(found.z, found.mesh.F)
-        images.append(image * (spaces[-1].sum() / image.sum()))
-    if not errors:
-        return None
-    space = np.concatenate(spaces)
-    return Best(
-        float(np.concatenate(errors).mean()),
-        texel_density_ratio(space, np.concatenate(images)),
-        float(space.sum() / areas.sum()),
-    )
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'' if number == 1 else 's'}" if number else f"no {what}s"
-
-
-def _sentence(found: Measurement) -> str:
-    """Return what the UVs are in a sentence."""
-    m = found.metrics
-    parts = [
-        _count(int(m["islands"] or 0), "island"),
-        f"mean angle error {m['angle_error_mean_deg'] or 0:.2f} degrees",
-        _count(int(m["flipped_triangles"] or 0), "fold"),
-        *(
-            f"{100 * (m[name] or 0):.2g} % of the image overlaps {where}"
-            for name, where in OVERLAPS.items()
-            if m[name] != 0
-        ),
-        texture_words(m),
-        f"{100 * (m['covered_share'] or 0):.0f} % of the square covered",
-    ]
-    return ", ".join(parts) + "."
-
-
-def _compared(found: Measurement) -> str:
-    """Return in a sentence what seams bought, and what a better solver would gain."""
-    here = found.metrics["angle_error_mean_deg"] or 0.0
-    texts = [
-        f"the best map of {name} has {one.angle_error_mean_deg:.2f} degrees and "
-        f"{density_words(one.texel_density_ratio)}"
-        + (f" (of {one.share:.0%} of the surface)" if one.share < 0.995 else "")
-        for name, one in found.best.items()
-    ]
-    text = " and ".join(texts)
-    whole = [name for name, one in found.best.items() if one.share >= COMPARABLE]
-    if ISLANDS in whole:
-        least = found.best[ISLANDS].angle_error_mean_deg
-        text += f": a better solver would gain {max(here - least, 0):.2f} degrees"
-        if WHOLE in whole and len(found.cut.seams):
-            bought = found.best[WHOLE].angle_error_mean_deg - least
-            text += f", and the seams buy {bought:.2f}"
-    return text[0].upper() + text[1:] + "."
+    return measured(surface, faces_and_uv, reporter, against=against is not None)

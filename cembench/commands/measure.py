@@ -1,17 +1,19 @@
-"""The command `measure`: how good are these UVs?"""
+"""The command `measure`: judge UVs that exist."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from cembench.api.measure import Measurement
 from cembench.api.measure import measure as measure_uv
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, note, out, print_json, print_pair
 from cembench.commands.from_api import Call, from_api
+
+if TYPE_CHECKING:
+    from cembench.api.measurement import Measurement
 
 #: Figures that are printed without --verbose, in this order, with their headings.
 FEW = {

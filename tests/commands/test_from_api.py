@@ -94,6 +94,10 @@ SAME = {
         next(dict(m.record.outcome.metrics) for m in cembench.map_files([cap])),
         said(cli, "map", cap),
     ),
+    "measure": lambda cli, cap: (
+        cembench.measure(cembench.parameterize(cap).save("uv.obj")).as_dict(),
+        said(cli, "measure", "uv.obj"),
+    ),
     "fetch": lambda cli, cap: (cembench.fetch().rows[0], said(cli, "fetch")[0]),
     "run": lambda cli, cap: (
         dict(cembench.benchmark([cap], ["cem"], rounds=1).asked[0].outcome.metrics),
