@@ -50,7 +50,7 @@ NOTEBOOK = """
 import cembench
 
 disk, ring = cembench.surface("hemi-ellipsoid", 400), cembench.surface("catenoid-ring", 400)
-for mesh, algorithm in ((disk, "direct-cem"), (ring, "direct-cem-holes")):
+for mesh, algorithm in ((disk, "plane"), (ring, "plane-holes")):
     cembench.write_mesh(f"{mesh.name}.off", mesh)
     for surface in (mesh, (mesh.V, mesh.F), f"{mesh.name}.off"):
         result = cembench.parameterize(surface)
