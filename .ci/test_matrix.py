@@ -36,7 +36,7 @@ SUBSET = (
     "tests/report/test_report.py",
     "tests/results/test_store.py",
     "tests/results/test_verify.py",
-    "tests/morphing/test_writers.py",
+    "tests/papers/morphing/test_writers.py",
 )
 
 

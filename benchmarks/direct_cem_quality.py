@@ -11,6 +11,7 @@ from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.algorithms.fdm import fdm
 from cembench.algorithms.ldm import ldm
 from cembench.algorithms.qiem import qiem
+from cembench.papers.cem.morphing.align import to_centre
 from numpy.typing import NDArray
 
 from benchmarks.disks import disk_of
@@ -20,7 +21,6 @@ from cembench import AlgorithmFailed, DiskMesh, Parameterization
 from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.gauge import gauge_measure
 from cembench.conformal.metrics import angle_errors, dirichlet_energy, flipped_triangles, image_area
-from cembench.morphing.align import to_centre
 
 PAPER = {"CEM": cem, "FDM": fdm, "LDM": ldm, "QIEM": qiem}
 #: What is compared, by the parameters besides the weights.

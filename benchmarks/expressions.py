@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import scipy.io
+from cembench.papers.cem.morph import morph
 from numpy.typing import NDArray
 
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
-from cembench.api.morph_surfaces import morph
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh

@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 import matplotlib as mpl
 import numpy as np
+from cembench.papers.cem.morphing.align import aligned, centred, to_centre, vertex_areas
+from cembench.papers.cem.morphing.landmarks import check_order
+from cembench.papers.cem.morphing.registration import register
 from cembench.surfaces.ict_face import LANDMARKS, ict_face, landmarks_of, sample, triangulation
 from cembench.surfaces.ict_model import load_model
 from matplotlib.figure import Figure
@@ -22,9 +25,6 @@ from cembench.conformal.planar import signed_areas
 from cembench.conformal.resample import interpolated, locate
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.morphing.align import aligned, centred, to_centre, vertex_areas
-from cembench.morphing.landmarks import check_order
-from cembench.morphing.registration import register
 from cembench.results.intervals import median_interval
 
 mpl.use("Agg")

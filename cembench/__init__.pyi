@@ -13,7 +13,6 @@ from cembench.api.fetch import fetch as fetch
 from cembench.api.map_files import map_files as map_files
 from cembench.api.measure import measure as measure
 from cembench.api.measurement import Measurement as Measurement
-from cembench.api.morph_surfaces import morph as morph
 from cembench.api.papers import check_paper as check_paper
 from cembench.api.parameterize import Result as Result
 from cembench.api.parameterize import parameterize as parameterize

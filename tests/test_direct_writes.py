@@ -16,7 +16,7 @@ ALLOWED = {
     "benchmarks/kept_run.py": "a copy that is made again when it was cut off",
     "cembench/core/atomic.py": "it is the place",
     "cembench/core/folders.py:publish": "moves files that were flushed and checked as drafts",
-    "cembench/morphing/writers.py:write_meshes": "moves checked drafts",
+    "papers/cem/morphing/writers.py:write_meshes": "moves checked drafts",
     "cembench/results/samples.py:append_line": "a journal grows by a line; a cut one is dropped",
     "cembench/running/launcher.py": "between processes, in the scratch folder",
     "cembench/running/timing.py": "between processes, in the scratch folder",

@@ -77,9 +77,8 @@ BUDGETS = {
     "drawing": 1_500,
     "report": 8_210,
     "validation": 2_380,
-    "morphing": 1_340,
-    "api": 5_690,
-    "commands": 3_130,
+    "api": 5_480,
+    "commands": 3_000,
 }
 
 

@@ -37,7 +37,6 @@ MODULES = {
     "validate": {"validate": "api.validate:validate"},
     "peers": {"peers": "commands.peers:peers"},
     "exhibits": {},  # those of papers
-    "morph": {"morph": "api.morph_surfaces:morph"},
     "fetch": {"fetch": "api.fetch:fetch"},
     "repair": {"repair": "api.repair:repair"},
     "cut": {"cut": "api.cut:cut"},

@@ -3,7 +3,7 @@
 An entry point of the group ``cembench.verbs`` names a module. What its ``__all__`` names is part of
 the Python API; the function of the entry point's name becomes a command. ``loaded`` reads a
 surface; ``shown``, ``facts`` and ``failures`` are what is printed of a list of results, the same as
-plain data, and what went wrong.
+plain data, and what went wrong. A module with a function ``add_command`` adds a command of its own.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ Surfaces = Annotated[
 def _add(entry: EntryPoint) -> None:
     """Add the command of an entry point."""
     verb, module = entry.name, entry.load()
+    if hasattr(module, "add_command"):
+        module.add_command()
+        return
     function = getattr(module, verb)
     usual: Any = inspect.signature(function).parameters["surface"].default
     usual = usual if usual is inspect.Parameter.empty else [usual]

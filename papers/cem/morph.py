@@ -1,158 +1,212 @@
-"""Exhibits of a morph: a strip of frames, and the registrations under a checkerboard."""
+"""Morph surfaces into each other."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from pathlib import Path
-from typing import Any
+import os
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
+from cembench.api.settings import AnyPath, Faces, Timeout, registry_with
+from cembench.core.arguments import Range, checked
+from cembench.core.errors import AlgorithmFailed, ParameterError
+from cembench.core.reporter import SILENT, Reporter
 
-from cembench.core.arrays import Picture
-from cembench.core.atomic import write_bytes
-from cembench.drawing.preview import draw_panels
-from cembench.drawing.scene import FILL
-from cembench.morphing.drawing import draw_film
-from cembench.morphing.metrics import tables_of
-from cembench.morphing.morph import Morph
-from cembench.results.exhibits import (
-    Exhibit,
-    ExhibitPicture,
-    exhibit_folder,
-    write_exhibit,
-)
-from cembench.results.papers import usual_paper
-from cembench.results.records import MeshOrigin
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
-from .page import page
+    from cembench.mesh.triangle_mesh import DiskMesh
+    from cembench.registry import Algorithm
+    from cembench.running.options import Options
+    from cembench.running.surfaces import SurfaceInput
 
-#: How landmarks and their targets are marked.
-_DOT: dict[str, Any] = {"linestyle": "", "marker": "o"}
-PLACE = _DOT | {"markersize": 5, "color": "#d11c21"}
-TARGET = _DOT | {"markersize": 10, "markerfacecolor": "none", "markeredgecolor": "#ffffff"}
-#: Number of frames of a strip, and the views of its rows.
-FRAMES, STRIP_VIEWS = 7, ("front", "three-quarter")
+    from .morphing.landmarks import Landmarks
+    from .morphing.morph import Morph
 
 
-def write_exhibits(
-    run: Path,
-    morph: Morph,
-    figures: dict[str, Any],
-    command: str,
-    rows_of_paper: tuple[str, ...],
-    tell: Callable[[str], object] = lambda step: None,
-    sides: tuple[int, int] = (240, 420),
-) -> list[Path]:
-    """Write both exhibits to a run's folder; return the paths of their descriptions.
+__all__ = ["morph"]
 
-    `figures` are the morph's metrics; `rows_of_paper` are the paper's models that the surfaces
-    stand in for, "" for none; `sides` are the pixels of a picture on each page.
+
+@checked
+def morph(
+    surfaces: Sequence[SurfaceInput],
+    landmarks: Mapping[str, Sequence[int]] | AnyPath | None = None,
+    *,
+    algorithm: str = "direct-cem",
+    parameters: Mapping[str, Any] | None = None,
+    lam: Annotated[float, Range(1e-6, 1e12)] = 100.0,
+    reach: Annotated[float, Range(0, 1)] = 0.4,
+    pose: Literal["similarity", "rigid", "keep"] = "similarity",
+    faces: Faces | None = None,
+    plugins: Sequence[str] = (),
+    timeout: Timeout = 600.0,
+    reporter: Reporter = SILENT,
+) -> Morph:
+    """Morph surfaces into each other through conformal maps (Section 6 of the paper).
+
+    The first landmark goes to the centre of the disk, the others are registered by Eq. 34, and the
+    first surface's vertices are carried onto all others. By default, the named landmarks that all
+    surfaces have are used, such as those of the generated faces. Without any landmarks, curvature
+    aligns the surfaces.
+
+    Parameters
+    ----------
+    surfaces : sequence of meshes, paths, names or pairs of arrays (V, F)
+        Two or more topological disks: mesh files, or names from :func:`cembench.list_surfaces`.
+    landmarks : mapping or path, optional
+        For each landmark name, its vertex on every surface, counted from 0; or a CSV file with a
+        row for each; or none.
+    algorithm : str
+        An algorithm with target disk.
+    parameters : mapping, optional
+        Parameters of the algorithm.
+    lam : float
+        Weight of the landmarks in Eq. 34.
+    reach : float
+        Landmark radius, as a share of the distance to the next; 0: the vertex alone.
+    pose : {"similarity", "rigid", "keep"}
+        Fit the later surfaces to the first by rotation, shift and scale, without scale, or keep
+        them.
+    faces : int, optional
+        Number of triangles of generated surfaces.
+    plugins : sequence of str
+        Python files or ``module:name`` with more algorithms.
+    timeout : float
+        Time limit of a call, in seconds.
+    reporter : Reporter
+        Receives what is being done.
+
+    Returns
+    -------
+    Morph
+        ``morph.at(t)`` returns the first surface's vertices, float64 (n, 3), at a time from 0 to 1,
+        and ``morph.save("film.gif")`` writes the path.
+
+    Raises
+    ------
+    MeshError
+        A surface is damaged or not a disk.
+    ParameterError
+        There are fewer than two surfaces, or the landmarks are inconsistent.
+    AlgorithmFailed
+        No map or no registration without folds was found.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> face = cembench.surface("hemi-ellipsoid", 300)
+    >>> path = cembench.morph([face, (face.V * [1, 1, 2], face.F)])
+    >>> path.at(0.5).shape == (face.n, 3)
+    True
+
     """
-    paper = usual_paper()
-    origin: MeshOrigin = "stand-in" if all(rows_of_paper) else "surface"
-    names = [mesh.name for mesh in morph.meshes]
-    stem = "-".join(names)
-    registrations, path = tables_of(figures)
-    shared: dict[str, Any] = {"command": command, "origin": origin, "facts": figures}
-    tell("drawing the strip")
-    strip = _picture(
-        run,
-        f"morph-{stem}",
-        "strip.png",
-        strip_page(morph, sides[0]),
-        f"From {names[0]} to {names[-1]}: seven moments of the path, from the front and from three "
-        "quarters.",
-    )
-    board = _picture(
-        run,
-        f"registration-{stem}",
-        "maps.png",
-        registration_page(morph, sides[1], tell),
-        "Conformal maps, and below them the Moebius map and the registrations: now equal squares "
-        "lie on the same features. Dots are landmarks, rings their targets.",
-    )
-    spline = "a cubic spline" if len(names) > 2 else "a straight line"
-    done = [
-        Exhibit(
-            name=f"morph-{stem}",
-            title="Morph: " + ", ".join(names),
-            text=f"The vertices of {names[0]} are carried onto the other surfaces, and {spline} in "
-            "time leads through their places.",
-            figure=paper.exhibited("morph", rows_of_paper),
-            pictures=(strip,),
-            tables=(path,),
-            **shared,
-        ),
-        Exhibit(
-            name=f"registration-{stem}",
-            title="Registration: " + ", ".join(names),
-            text="Conformal maps f of the surfaces to the disk; a Moebius map m1 that takes the "
-            "first landmark to the centre; registration maps r that minimise (34).",
-            figure=paper.exhibited("registration", rows_of_paper),
-            pictures=(board,),
-            tables=(registrations,),
-            **shared,
-        ),
-    ]
-    return [write_exhibit(run, exhibit) for exhibit in done]
+    from dataclasses import replace
+    from time import perf_counter
 
+    from cembench.drawing.camera import viewpoints
+    from cembench.mesh.triangle_mesh import DiskMesh
+    from cembench.running.options import Options
+    from cembench.running.surfaces import is_generated, load_surface
 
-def _picture(run: Path, name: str, file: str, content: bytes, caption: str) -> ExhibitPicture:
-    write_bytes(exhibit_folder(run, name) / file, content)
-    return ExhibitPicture(file=file, caption=caption, alternative=caption)
+    from .morphing.morph import morph as register_all
 
-
-def strip_page(morph: Morph, side: int = 240) -> bytes:
-    """Return a PNG of the path at seven moments, one column each, in two views."""
-    times = np.linspace(0, 1, FRAMES)
-    pictures = draw_film(morph.meshes[0], morph.stops, times, STRIP_VIEWS, side)
-    rows = [
-        [picture[:, row * side : (row + 1) * side] for picture in pictures]
-        for row in range(len(STRIP_VIEWS))
-    ]
-    knots = np.linspace(0, 1, len(morph.meshes))
-    heads = []
-    for time in times:
-        at = np.flatnonzero(np.isclose(knots, time))
-        heads.append(f"t = {time:.2f}" + (f"\n{morph.meshes[at[0]].name}" if len(at) else "\n"))
-    return page(rows, heads, sides=STRIP_VIEWS)
-
-
-def registration_page(
-    morph: Morph, side: int = 420, tell: Callable[[str], object] = lambda step: None
-) -> bytes:
-    """Return a PNG of f_k, the Moebius map and the registrations, one column per surface.
-
-    Rows: the surface under the checkerboard of its conformal map, and that map; the same for the
-    registered map. Red dots are the landmarks, white rings those of the first surface.
-    """
-    registered = [morph.aligned[0], *(one.uv for one in morph.registrations)]
-    rows: list[list[Picture]] = [[], [], [], []]
-    for k, mesh in enumerate(morph.meshes):
-        tell(f"drawing {mesh.name}")
-        for row, uv in ((0, morph.maps[k]), (2, registered[k])):
-            surface, image = draw_panels(mesh, uv, side)
-            rows[row].append(surface)
-            rows[row + 1].append(image)
-    places = morph.landmarks.vertices
-    marks: dict[tuple[int, int], Any] = {}
-    for k in range(len(morph.meshes)):
-        first, own, moved = (
-            FILL * np.stack([z.real, z.imag], axis=1)
-            for z in (
-                morph.aligned[0][places[:, 0]],
-                morph.maps[k][places[:, k]],
-                registered[k][places[:, k]],
-            )
+    if len(surfaces) < 2:
+        raise ParameterError("a morph needs two surfaces or more; name at least one more.")
+    registry = registry_with(plugins, reporter)
+    chosen = registry.algorithm(algorithm)
+    if chosen.target != "disk":
+        able = ", ".join(a.name for a in registry.algorithms.values() if a.target == "disk")
+        raise ParameterError(
+            f"{algorithm} maps to the target {chosen.target!r}; a morph needs the disk: {able}."
         )
-        marks |= {(1, k): [(own, PLACE)], (3, k): [(moved, PLACE), (first, TARGET)]}
-    numbers = range(1, len(morph.meshes) + 1)
-    after = ["m1 f1", *(f"r{k}" for k in numbers[1:])]
-    heads = [f"M{k}: {mesh.name}" for k, mesh in zip(numbers, morph.meshes, strict=True)]
-    notes = [
-        [f"M{k} under the board of f{k}" for k in numbers],
-        [f"f{k}" for k in numbers],
-        [f"M{k} under the board of {name}" for k, name in zip(numbers, after, strict=True)],
-        [f"{name}, landmarks registered" if k else name for k, name in enumerate(after)],
-    ]
-    return page(rows, heads, notes=notes, marks=marks)
+    meshes: list[DiskMesh] = []
+    known: list[Mapping[str, int]] = []
+    for surface in surfaces:
+        what = os.fspath(surface) if isinstance(surface, str | os.PathLike) else "a surface"
+        with reporter.busy(f"reading {what}"):
+            mesh = load_surface(surface, (DiskMesh,), faces=faces, registry=registry)
+        find = registry.surface(surface).landmarks if is_generated(surface, registry) else None
+        for notice in mesh.notices:
+            reporter.note(f"{mesh.name}: {notice}")
+        meshes.append(mesh)
+        known.append(find(mesh) if find else {})
+    places = _places(landmarks, meshes, known)
+    first, started = meshes[0], perf_counter()
+    right, up, _ = viewpoints(first)["front"]
+    with reporter.busy("mapping") as tell:
+        options = Options(timeout=timeout)
+        maps = [_mapped(chosen, mesh, parameters or {}, plugins, options, tell) for mesh in meshes]
+        mapped = perf_counter()
+        registrations = register_all(
+            meshes,
+            maps,
+            places,
+            lam=lam,
+            reach=reach,
+            pose=pose,
+            upright=first.V @ right + 1j * (first.V @ up),
+            tell=tell,
+        )
+    seconds = {"maps": mapped - started, "registration": perf_counter() - mapped}
+    return replace(registrations, seconds=seconds)
+
+
+def _mapped(
+    algorithm: Algorithm,
+    mesh: DiskMesh,
+    parameters: Mapping[str, Any],
+    plugins: Sequence[str],
+    options: Options,
+    tell: Callable[[str], object],
+) -> NDArray[np.complex128]:
+    """Map a surface to the disk in a process of its own; raise if the map is not valid."""
+    from cembench.running.local import map_once
+    from cembench.running.plan import MeasurementSettings, plan_cells
+
+    (task,) = plan_cells([algorithm], [mesh], parameters, MeasurementSettings(repeats=1), plugins)
+    tell(f"{algorithm.title} on {mesh.name}")
+    record, uv = map_once(task, options)
+    if record.outcome.status != "ok" or uv is None:
+        raise AlgorithmFailed(f"{mesh.name}: {record.outcome.status}: {record.outcome.cause}")
+    return uv
+
+
+def _places(
+    landmarks: Mapping[str, Sequence[int]] | AnyPath | None,
+    meshes: Sequence[DiskMesh],
+    known: Sequence[Mapping[str, int]],
+) -> Landmarks:
+    """Return the landmarks that were given, else the named ones that all surfaces have."""
+    from pathlib import Path
+
+    import numpy as np
+
+    from .morphing.landmarks import (
+        Landmarks,
+        check_landmarks,
+        common_landmarks,
+        read_landmarks,
+    )
+
+    if landmarks is None:
+        return common_landmarks(meshes, known)
+    if isinstance(landmarks, str | os.PathLike):
+        if os.fspath(landmarks) == "none":
+            return common_landmarks(meshes, [{} for _ in known])
+        return read_landmarks(Path(landmarks), meshes, known)
+    rows = [list(row) for row in landmarks.values()]
+    for name, row in zip(landmarks, rows, strict=True):
+        if len(row) != len(meshes):
+            raise ParameterError(
+                f"landmark {name!r} has {len(row)} vertices; it needs one for each of "
+                f"the {len(meshes)} surfaces."
+            )
+    vertices = np.array(rows, dtype=np.int64).reshape(len(rows), len(meshes))
+    places = Landmarks(tuple(landmarks), vertices)
+    check_landmarks(places, meshes)
+    return places
+
+
+def add_command() -> None:
+    """Add the command of this verb, which takes more than one surface."""
+    from . import morph_command  # noqa: F401 - it registers itself

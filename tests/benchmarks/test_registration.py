@@ -4,11 +4,11 @@ import csv
 
 import numpy as np
 import pytest
+from cembench.papers.cem.morphing.align import to_centre
 
 from benchmarks import registration
 from benchmarks.pages import ROOT, Section, filled
 from benchmarks.registration import FITTED, METHODS, PAPER, PLAIN, Row, differences, fitted, parts
-from cembench.morphing.align import to_centre
 
 
 def table(rows, modes):

@@ -80,7 +80,7 @@ def a_stand_in(folder):
 
 
 def a_film(folder):
-    from cembench.morphing.writers import check_output
+    from cembench.papers.cem.morphing.writers import check_output
 
     check_output(folder / "a.mp4")
 

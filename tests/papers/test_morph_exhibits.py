@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
-from cembench.papers.cem.morph import write_exhibits
+from cembench.papers.cem.morph_exhibits import write_exhibits
+from cembench.papers.cem.morphing.morph import morph
 from PIL import Image
 
-from cembench.morphing.morph import morph
 from cembench.results.exhibits import read_exhibits
 from cembench.results.papers import find_paper
-from tests.morphing.reliefs import three
+from tests.papers.morphing.reliefs import three
 
 FACES = find_paper("cem").exhibits[-1].models
 

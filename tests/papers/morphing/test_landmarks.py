@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from cembench.papers.cem.morphing.landmarks import check_order, common_landmarks, read_landmarks
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import ParameterError
-from cembench.morphing.landmarks import check_order, common_landmarks, read_landmarks
 
 MESHES = [flat_disk(200), flat_disk(300)]
 INSIDE = [mesh.interior for mesh in MESHES]

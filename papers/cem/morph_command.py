@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import entry_points
 from pathlib import Path
 from time import perf_counter
 from typing import Annotated, Any
 
 import typer
 
-from cembench.api.morph_surfaces import morph as morph_surfaces
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, complain, out, print_json, print_pair, split
 from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import AlgorithmFailed
+
+from .morph import morph as morph_surfaces
 
 
 @app.command(
@@ -57,11 +57,13 @@ def morph(
 ) -> None:
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.overwriting import refuse_inputs
-    from cembench.morphing.drawing import check_views
-    from cembench.morphing.writers import check_output, files_of, is_film, write_path
     from cembench.registry import load_registry
     from cembench.results import run_folder
     from cembench.running.plan import provenances
+
+    from .morph_exhibits import write_exhibits
+    from .morphing.drawing import check_views
+    from .morphing.writers import check_output, files_of, is_film, write_path
 
     chosen_views, keywords = split([views]), call.keywords
     check_views(chosen_views)
@@ -101,8 +103,7 @@ def morph(
             registry = load_registry(keywords["plugins"])
             roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
             rows = tuple(roles[name].paper_row if name in roles else "" for name in surfaces)
-            for paper in entry_points(group="cembench.exhibits", name="morph"):
-                written += paper.load()(run, morphed, figures, command, rows, tell)
+            written += write_exhibits(run, morphed, figures, command, rows, tell)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -122,8 +123,9 @@ def _timed(seconds: dict[str, float], name: str) -> Iterator[None]:
 
 def _print(figures: dict[str, Any], landmarks: tuple[str, ...]) -> None:
     """Print the figures."""
-    from cembench.morphing.metrics import tables_of
     from cembench.report.content.exhibits import exhibit_table
+
+    from .morphing.metrics import tables_of
 
     print_pair("landmarks", ", ".join(landmarks) or "none: aligned by curvature")
     print_pair("lambda", f"{figures['lambda']:g}" if landmarks else "-")

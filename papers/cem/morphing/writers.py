@@ -16,10 +16,11 @@ from cembench.core.errors import ParameterError
 from cembench.core.extras import Extra, require
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.morphing.drawing import draw_film
+
+from .drawing import draw_film
 
 if TYPE_CHECKING:
-    from cembench.morphing.morph import Morph
+    from .morph import Morph
 
 Pictures = NDArray[np.uint8]
 

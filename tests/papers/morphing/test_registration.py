@@ -1,6 +1,8 @@
 import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
+from cembench.papers.cem.morphing.align import centred
+from cembench.papers.cem.morphing.registration import NEAR, first_fold, radially_stretched, register
 from cembench.surfaces.flat_disk import flat_disk
 from scipy import sparse
 
@@ -8,9 +10,7 @@ from cembench import AlgorithmFailed
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import dilatations, flipped_triangles
 from cembench.linear_algebra.cholesky import Cholesky
-from cembench.morphing.align import centred
-from cembench.morphing.registration import NEAR, first_fold, radially_stretched, register
-from tests.morphing.reliefs import NEUTRAL, relief, vertices_of
+from tests.papers.morphing.reliefs import NEUTRAL, relief, vertices_of
 
 
 @pytest.fixture(scope="module")

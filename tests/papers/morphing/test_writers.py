@@ -3,18 +3,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cembench.surfaces.flat_disk import flat_disk
-from PIL import Image
-
-from cembench.core.errors import CembenchError, RecordError
-from cembench.mesh.files import read_mesh
-from cembench.morphing.writers import (
+from cembench.papers.cem.morphing.writers import (
     check_output,
     mesh_files,
     write_arrays,
     write_film,
     write_meshes,
 )
+from cembench.surfaces.flat_disk import flat_disk
+from PIL import Image
+
+from cembench.core.errors import CembenchError, RecordError
+from cembench.mesh.files import read_mesh
 from tests.limits import files_of_at_most, tree
 
 MESH = flat_disk(100)

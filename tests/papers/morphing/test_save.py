@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
+from cembench.papers.cem.morphing.morph import morph
 
 from cembench import ParameterError
-from cembench.morphing.morph import morph
-from tests.morphing.reliefs import three
+from tests.papers.morphing.reliefs import three
 
 
 @pytest.fixture(scope="module")

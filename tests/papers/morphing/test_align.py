@@ -1,10 +1,7 @@
 import numpy as np
 import pytest
 from cembench.algorithms.cem import cem
-
-from cembench.conformal.laplacian import cotangent_laplacian
-from cembench.conformal.metrics import flipped_triangles
-from cembench.morphing.align import (
+from cembench.papers.cem.morphing.align import (
     aligned,
     best_turn,
     centred,
@@ -12,7 +9,10 @@ from cembench.morphing.align import (
     vertex_areas,
     without_new_folds,
 )
-from tests.morphing.reliefs import SMILE, relief, vertices_of
+
+from cembench.conformal.laplacian import cotangent_laplacian
+from cembench.conformal.metrics import flipped_triangles
+from tests.papers.morphing.reliefs import SMILE, relief, vertices_of
 
 NONE = np.empty(0, dtype=np.int64)
 

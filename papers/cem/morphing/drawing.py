@@ -13,7 +13,8 @@ from cembench.drawing.camera import viewpoints
 from cembench.drawing.painter import draw_clay
 from cembench.drawing.scene import FILL
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.morphing.path import position
+
+from .path import position
 
 Pictures = NDArray[np.uint8]
 

@@ -11,8 +11,9 @@ from cembench.conformal.metrics import dilatations, dirichlet_energy, flipped_tr
 from cembench.core.arrays import Real
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.morphing.registration import Registration
 from cembench.results.exhibits import ExhibitTable
+
+from .registration import Registration
 
 Ints = NDArray[np.int64]
 

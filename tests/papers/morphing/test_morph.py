@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from cembench.papers.cem.morphing.landmarks import Landmarks
+from cembench.papers.cem.morphing.metrics import distances_to, mean_edge
+from cembench.papers.cem.morphing.morph import morph
 
 from cembench.conformal.metrics import flipped_triangles
-from cembench.morphing.landmarks import Landmarks
-from cembench.morphing.metrics import distances_to, mean_edge
-from cembench.morphing.morph import morph
-from tests.morphing.reliefs import relief, three
+from tests.papers.morphing.reliefs import relief, three
 
 
 @pytest.fixture(scope="module")

@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 from cembench.conformal.resample import interpolated, locate
 from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.morphing.align import aligned, best_turn, centred, vertex_areas
-from cembench.morphing.landmarks import Landmarks, check_order
-from cembench.morphing.metrics import registration_metrics, size_of
-from cembench.morphing.path import largest_acceleration, largest_step, pose_of, position
-from cembench.morphing.registration import LAMBDA, REACH, Registration, register
+
+from .align import aligned, best_turn, centred, vertex_areas
+from .landmarks import Landmarks, check_order
+from .metrics import registration_metrics, size_of
+from .path import largest_acceleration, largest_step, pose_of, position
+from .registration import LAMBDA, REACH, Registration, register
 
 #: How the later surfaces are moved before the path is drawn through them.
 Pose = Literal["similarity", "rigid", "keep"]
@@ -98,7 +99,7 @@ class Morph:
             MP4 needs a package that is not installed.
 
         """
-        from cembench.morphing.writers import files_of, write_path
+        from .writers import files_of, write_path
 
         write_path(self, [Path(path)], frames, views, size)
         return files_of(Path(path), frames)

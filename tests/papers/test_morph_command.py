@@ -9,7 +9,7 @@ from cembench.surfaces.flat_disk import flat_disk
 from cembench.mesh.files import read_mesh, write_mesh
 from cembench.results.exhibits import read_exhibits
 from tests import gallery
-from tests.morphing.reliefs import NEUTRAL, SMILE, relief, vertices_of
+from tests.papers.morphing.reliefs import NEUTRAL, SMILE, relief, vertices_of
 from tests.real_meshes import real_mesh
 
 FAULTY = str(Path(__file__).parents[1] / "running/faulty.py")
@@ -162,7 +162,7 @@ def test_landmarks_that_cannot_meet_are_exit_code_1(coarse):
 def test_a_real_face_morphs_into_a_real_head(cli):
     """A mask into a whole head: five landmarks, no folds, and both ways near to the target."""
     face, head = real_mesh("human_face.obj"), real_mesh("max_planck_head.ply")
-    marks = Path(__file__).parents[1] / "morphing/human_face-max_planck_head.csv"
+    marks = Path(__file__).parent / "morphing/human_face-max_planck_head.csv"
     code, out, _ = cli("morph", face, head, "--landmarks", marks, "--frames", 48, "--json")
     assert code == 0
     (row,) = json.loads(out)["registrations"]

@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
+from cembench.papers.cem.morphing.drawing import VIEWS, check_views, draw_film, fitted_views
+from cembench.papers.cem.morphing.path import position
 
 from cembench import ParameterError
 from cembench.drawing.painter import draw_clay
-from cembench.morphing.drawing import VIEWS, check_views, draw_film, fitted_views
-from cembench.morphing.path import position
-from tests.morphing.reliefs import relief
+from tests.papers.morphing.reliefs import relief
 
 MESH = relief(faces=600)
 STOPS, TIMES = [MESH.V, 0.5 * MESH.V], np.linspace(0, 1, 3)

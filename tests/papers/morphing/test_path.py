@@ -2,8 +2,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-
-from cembench.morphing.path import (
+from cembench.papers.cem.morphing.path import (
     largest_acceleration,
     largest_step,
     pose_of,

@@ -2,10 +2,10 @@
 
 import numpy as np
 from cembench.algorithms.cem import cem
+from cembench.papers.cem.morphing.landmarks import Landmarks
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh
-from cembench.morphing.landmarks import Landmarks
 
 #: Where the bumps are, by name, as x + i y.
 NEUTRAL = {"nose": 0.05j, "eye right": -0.35 + 0.4j, "eye left": 0.35 + 0.4j, "mouth": -0.45j}
