@@ -78,9 +78,16 @@ def test_exhibits_are_sections_with_their_pictures_and_tables(written):
     assert [v.number for row in table.rows for v in row] == [1, 0.1, 2, None]
 
 
-def test_stand_ins_are_said_to_stand_for_counts_and_not_for_difficulty(small_run):
+def test_stand_ins_are_said_to_stand_for_counts_and_only_fitted_ones_for_difficulty(small_run):
     evidence = Evidence.of(small_run)
     words = stand_ins_words(evidence)
+    given = {"fitted": "fdm"}
+    facts = [r.mesh.model_copy(update=given) for r in evidence.records]
+    fitted = tuple(
+        r.model_copy(update={"mesh": mesh}) for r, mesh in zip(evidence.records, facts, strict=True)
+    )
+    assert "not for their difficulty" in words
+    assert "decides nothing" in stand_ins_words(replace(evidence, records=fitted))
     assert words.startswith("2 of 2 surfaces are stand-ins")
     low, high = re.search(
         r"E_C by CEM is (\S+) to (\S+) times the printed one, and 0 of 2", words

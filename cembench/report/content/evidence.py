@@ -44,7 +44,7 @@ FRAME_COLUMNS = (
 #: many degrees larger.
 AS_GOOD, DEGREES = 1.25, 0.25
 #: What a surface has of its record.
-_FACTS = ("vertices", "faces", "boundary_vertices", "non_delaunay_share")
+_FACTS = ("vertices", "faces", "boundary_vertices", "non_delaunay_share", "fitted")
 #: Parameters that distinguish two cells of an algorithm, besides surface and policy.
 Variant = tuple[tuple[str, str], ...]
 
@@ -84,6 +84,8 @@ class MeasuredSurface:
     origin: MeshOrigin
     #: The object that it shows.
     family: str
+    #: The algorithm to whose printed figures a stand-in was fitted.
+    fitted: str = ""
 
     @property
     def title(self) -> str:

@@ -290,12 +290,21 @@ def stand_ins_words(evidence: Evidence) -> str:
         if ratios
         else ""
     )
+    begin = (
+        f"{len(standing)} of {len(evidence.models)} surfaces are stand-ins for the paper's models"
+    )
+    if all(s.fitted for s in standing):
+        return (
+            f"{begin}: generated surfaces with their counts of triangles and boundary vertices, as "
+            f"hard to map as the printed figures say ({energy}{thin} of {len(standing)} have edges "
+            "that are not Delaunay), but of other shapes. What they were fitted to is marked and "
+            "decides nothing; docs/surfaces.md says how well they predict the rest."
+        )
     return (
-        f"{len(standing)} of {len(evidence.models)} surfaces are stand-ins for the paper's models. "
-        "They stand in for the models' counts, triangles and boundary vertices, and so for "
-        f"seconds; not for their difficulty: {energy}{thin} of {len(standing)} have edges that are "
-        "not Delaunay. Their energies and angles belong to other surfaces. docs/surfaces.md names "
-        "the real surface nearest to each row in counts and difficulty."
+        f"{begin}. They stand in for the models' counts, triangles and boundary vertices, and so "
+        f"for seconds; not for their difficulty: {energy}{thin} of {len(standing)} have edges that "
+        "are not Delaunay. Their energies and angles belong to other surfaces. docs/surfaces.md "
+        "names the real surface nearest to each row in counts and difficulty."
     )
 
 
