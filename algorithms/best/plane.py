@@ -106,7 +106,7 @@ def _in_the_plane(
         return made
     uv, folds = with_area_pi(mesh, made.uv, repair=repair)  # rounding folds what is thin
     extras = made.extras | folds | {"instead_of": "a map with a free boundary"}
-    return replace(made, uv=uv, extras=extras)
+    return replace(made, uv=uv, energy_history=(), extras=extras)  # at another scale
 
 
 def _overlap(mesh: TriangleMesh, z: Complex) -> str:
