@@ -65,7 +65,11 @@ BODIES: Mapping[str, Callable[[int], Body]] = {
 }
 
 #: Revisions of changed solids: only their cached surfaces are made again.
-REVISIONS = {"ho-pouting-face-stand-in": 1, "liu-pouting-face-stand-in": 1}
+REVISIONS = {
+    "cowboy-hat-stand-in": 1,
+    "ho-pouting-face-stand-in": 1,
+    "liu-pouting-face-stand-in": 1,
+}
 
 
 def stand_in(
