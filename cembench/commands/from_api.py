@@ -183,7 +183,7 @@ def _option_of(
         metavar, repeatable = metavar or "NAME", f" One of {allowed}."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if choices and not argument.many:
-        more |= {"parser": partial(one_of, choices)}
+        more |= {"parser": one_of(choices)}
         more["metavar"] = more["metavar"] or "|".join(choices)
         kind = str
     if kind in (int, float) and argument.range is not None:
@@ -232,12 +232,16 @@ def _value(argument: Argument, passed: Any) -> Any:
     return items or argument.default
 
 
-def one_of(choices: Sequence[str], value: str) -> str:
-    """Return a word that is one of the choices; the error has the nearest of them."""
-    if value not in choices:
-        near = did_you_mean(value, choices)
-        raise typer.BadParameter(f"{value!r} is not one of {', '.join(choices)}.{near}")
-    return value
+def one_of(choices: Sequence[str]) -> Callable[[str], str]:
+    """Return a parser of words that are one of the choices; its error has the nearest of them."""
+
+    def choice(value: str) -> str:
+        if value not in choices:
+            near = did_you_mean(value, choices)
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(choices)}.{near}")
+        return value
+
+    return choice
 
 
 def finite(value: float | None) -> float | None:

@@ -180,7 +180,7 @@ def test_in_processes_of_its_own(cli, name):
     said = json.loads(out)["verdict"]
     expected = {
         "right": "valid; E_C in the common gauge equal to CEM",
-        "not-conformal": "invalid: E_C under refinement: on hemi-ellipsoid",
+        "not-conformal": "invalid: not conformal. Its E_C does not vanish under refinement",
         "hangs": "invalid: returns a map: timeout on uneven hemi-ellipsoid: not finished after 20",
     }
     assert said.startswith(expected[name])
