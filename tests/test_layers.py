@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 5_400,
     "running": 7_720,
     "drawing": 1_500,
-    "report": 8_220,
+    "report": 8_230,
     "validation": 2_380,
     "api": 5_480,
     "commands": 3_000,

@@ -37,6 +37,7 @@ from cembench.report.palette import series_styles
 from cembench.report.plot_rows import average, front
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.results.columns import significant
+from cembench.results.comparison import scatters
 from cembench.results.machines import machine_of, machine_of_record
 
 if TYPE_CHECKING:
@@ -189,6 +190,11 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
         frame = frame.assign(
             run=entrant.name,
             object=frame["family"],
+            # What is not repeatable is not called the fastest.
+            as_good=[
+                good and not scatters(record)
+                for good, record in zip(frame["as_good"], records, strict=True)
+            ],
             label=[apart.get(label, label) for label in frame["label"]],
             record=[f"{number:03d}{key}" for key in frame["key"]],
             machine=[machine_of_record(record, environments) for record in records],

@@ -60,3 +60,21 @@ def test_it_opens_with_a_ranked_table_for_each_target_and_a_plot(evidence, tmp_p
         fastest = [row[place] for row in table.rows if row[place].number == 1]
         assert all(value.record for value in fastest)
         assert len(fastest) >= 1
+
+
+def test_what_is_not_repeatable_is_not_called_the_fastest(evidence):
+    def scattered(record):
+        if record.cell.algorithm != "cem":
+            return record
+        rounds = [one.model_copy(update={"differs": True}) for one in record.outcome.rounds]
+        outcome = record.outcome.model_copy(update={"rounds": tuple(rounds)})
+        return record.model_copy(update={"outcome": outcome})
+
+    def fastest(records):
+        runs = [Entrant("a", replace(evidence, records=records))]
+        table = next(t for t in items_of(leaderboard(runs, ""), Table) if t.name == "ranked-disk")
+        place = [column.title for column in table.columns].index("fastest")
+        return {row[0].text: row[place].number for row in table.rows}
+
+    assert fastest(evidence.records)["CEM"] >= 1
+    assert not fastest(tuple(map(scattered, evidence.records)))["CEM"]
