@@ -12,20 +12,15 @@ Names are loaded when they are first used, so that importing the package costs l
 
 from __future__ import annotations
 
-import ast
 import importlib
+import re
 import sys
 from pathlib import Path
 from typing import Any
 
-_STUB = ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8"))
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
 #: Where each public name lies, by the imports of `__init__.pyi`.
-_PLACE_OF = {
-    alias.name: str(node.module)
-    for node in _STUB.body
-    if isinstance(node, ast.ImportFrom) and node.module != "typing"
-    for alias in node.names
-}
+_PLACE_OF = {name: place for place, name in re.findall(r"(?m)^from (\S+) import (\w+) as", _STUB)}
 
 __all__ = sorted((*_PLACE_OF, "__version__"))
 
