@@ -13,7 +13,6 @@ import os
 import stat
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, TypeVar
@@ -87,7 +86,9 @@ _WRITERS: dict[str, Callable[[Soup], bytes]] = {
 _OF_TEXTURES: dict[str, Callable[..., bytes]] = {".ply": ply.write, ".glb": gltf.write}
 #: Formats that hold texture coordinates.
 WITH_UV = (".obj", ".ply", ".glb", ".vtp", ".npz")
-#: Those whose texture coordinates are read, of which one for each vertex needs copies of vertices.
+#: Those whose texture coordinates are read with the surface.
+READ_WITH_UV = (".obj", ".off", ".ply", ".glb", ".gltf", ".vtp")
+#: Those of which one for each vertex needs copies of vertices.
 _WITH_UV_OF_VERTICES = (".obj", ".off", ".ply")
 #: Those that hold texture coordinates in single precision.
 SINGLE = (".ply", ".glb")
@@ -158,32 +159,6 @@ def read_soup(
             f"{path}: the file cannot be read ({error.strerror or error}). Check its permissions "
             "and the disk."
         ) from error
-
-
-def read_soup_with_uv(path: str | os.PathLike[str]) -> Soup:
-    """Read a file with its texture coordinates, of vertices or of corners.
-
-    Raises
-    ------
-    MeshError
-        As for :func:`read_soup`, or the file holds none.
-
-    """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    soup = read_soup(path, uv=suffix in WITH_UV and suffix not in _OF_ARRAYS)
-    if suffix in _OF_ARRAYS:
-        try:
-            held = _OF_ARRAYS[suffix](path, uv=True)
-        except MeshError as error:
-            raise located(error, path) from None
-        soup = replace(soup, uv=held.uv, uv_index=held.uv_index if len(held.sizes) else None)
-    if soup.uv is None or not len(soup.uv):
-        raise MeshError(
-            f"{path}: it holds no UVs. Unwrap the surface and export it with them, as "
-            f"{', '.join(WITH_UV)}; or map it with cembench."
-        )
-    return soup
 
 
 def _library_reader(suffix: str) -> Callable[..., Soup] | None:
@@ -418,23 +393,28 @@ def write_mesh(
     """
     path = Path(path)
     try:
-        z = None if uv is None else _image(uv, mesh.n)
+        n = mesh.n
+        allowed = (
+            f"one value for each of the {n} vertices: complex, shape ({n},), or real, "
+            f"shape ({n}, 2)"
+        )
+        z = None if uv is None else complex_images(uv, [(n,)], allowed)
     except MeshError as error:
         raise located(error, path) from None
     write_soup(path, Soup.of_triangles(mesh.V, mesh.F, z, name=mesh.name))
 
 
-def _image(uv: ArrayLike, n: int) -> Complex:
-    """Return the images of n vertices, complex (n,) or real (n, 2), as finite complex numbers."""
+def complex_images(uv: ArrayLike, shapes: Sequence[tuple[int, ...]], allowed: str) -> Complex:
+    """Return images as finite complex numbers of one of the `shapes`.
+
+    Real ones have two columns more. The error says in the words `allowed` what is.
+    """
     z = array_of("UVs", uv, 2)
-    if z.shape == (n, 2) and z.dtype.kind in "fiu":
-        z = complex_of(z)
-    if z.shape != (n,) or z.dtype.kind != "c":
-        raise MeshError(
-            f"uv is of type {z.dtype} and shape {z.shape}; allowed is one value for each of the "
-            f"{n} vertices: complex, shape ({n},), or real, shape ({n}, 2)."
-        )
-    check_finite("uv is", z)
+    if z.shape in [(*shape, 2) for shape in shapes] and z.dtype.kind in "fiu":
+        z = complex_of(z).reshape(z.shape[:-1])
+    if z.shape not in shapes or z.dtype.kind != "c":
+        raise MeshError(f"uv is of type {z.dtype} and shape {z.shape}; allowed is {allowed}.")
+    check_finite("uv is", z.ravel())
     return z.astype(np.complex128)
 
 

@@ -7,13 +7,14 @@ program was given.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from cembench.core.arrays import Complex, Indices, Points
 from cembench.core.errors import MeshError, describe_error
-from cembench.mesh.files import read_soup
+from cembench.mesh.files import READ_WITH_UV, read_soup
 from cembench.mesh.formats import mat, npz, obj, off, ply
 from cembench.mesh.soup import NO_UV, Soup, columns, complex_of, damaged, shown
 
@@ -46,6 +47,29 @@ def read_uv(path: Path) -> Soup:
         )
         raise damaged(f"it holds no UVs{obj_words if path.suffix.lower() == '.obj' else ''}")
     return file
+
+
+def read_with_uv(path: Path) -> Soup:
+    """Read a surface with its UVs, of vertices or of corners.
+
+    Raises
+    ------
+    MeshError
+        The file cannot be read as a surface, or holds no UVs.
+
+    """
+    suffix = path.suffix.lower()
+    soup = read_soup(path, uv=suffix in READ_WITH_UV)
+    if suffix in (".mat", ".npz"):
+        held = read_uv(path)
+        soup = replace(soup, uv=held.uv, uv_index=held.uv_index if len(held.sizes) else None)
+    if soup.uv is None or not len(soup.uv):
+        formats = ", ".join((*READ_WITH_UV, ".mat", ".npz"))
+        raise MeshError(
+            f"{path}: it holds no UVs. Unwrap the surface and export it with them, as {formats}; "
+            "or map it with cembench."
+        )
+    return soup
 
 
 def read_flat(path: Path) -> Soup:
@@ -88,23 +112,38 @@ def uv_of_corners(file: Soup, V: Points, F: Indices) -> Complex:
             f"it holds {len(file.uv)} UVs; required is one for each of the {len(V)} vertices, or "
             f"for each of the {F.size} corners"
         )
-    corners = file.uv_triangles
-    if (corners == NO_UV).all() and len(file.uv) == len(file.V):
-        corners = file.triangles
+    corners = uv_numbers(file)
     if (corners == NO_UV).any():
         raise damaged("a triangle has a corner without a UV; write f vertex/uv vertex/uv ...")
     if len(corners) != len(F):
         raise OtherSurfaceError(f"it holds {len(corners)} triangles; the surface has {len(F)}")
-    if corners.min() < 0 or corners.max() >= len(file.uv):
-        raise MeshError(
-            f"a corner has UV number {int(corners.max())}, but there are {len(file.uv)} UVs"
-        )
     uv = file.uv[corners]
     if not len(file.corners):
         return uv
     G = _vertex_numbers(file.V, V)[file.triangles] if len(file.V) else file.triangles
     at, turn = _places(G, F)
     return np.take_along_axis(uv[at], (np.arange(3) + turn[:, None]) % 3, axis=1)
+
+
+def uv_numbers(file: Soup) -> Indices:
+    """Return the number of the UV of each corner (m, 3); :data:`NO_UV` for none.
+
+    Where no corner has one, and there are as many as vertices, it is that of the vertex.
+
+    Raises
+    ------
+    MeshError
+        There is no UV of this number.
+
+    """
+    assert file.uv is not None
+    corners = file.uv_triangles
+    if (corners == NO_UV).all() and len(file.uv) == len(file.V):
+        corners = file.triangles
+    unknown = corners[(corners < NO_UV) | (corners >= len(file.uv))]
+    if len(unknown):
+        raise MeshError(f"a corner has UV number {unknown[0]}, but there are {len(file.uv)} UVs")
+    return corners
 
 
 def uv_of_faces(path: Path, F: Indices) -> Points:

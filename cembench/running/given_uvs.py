@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from cembench.conformal.laplacian import double_areas
 from cembench.core.arrays import Complex, Mask
 from cembench.core.errors import MeshError
-from cembench.mesh.defects import array_of, check_finite, located, representatives
-from cembench.mesh.files import read_soup_with_uv
-from cembench.mesh.soup import NO_UV, Soup, complex_of
+from cembench.mesh.defects import located, representatives
+from cembench.mesh.files import complex_images
+from cembench.mesh.soup import Soup
 from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.mesh.uvs import read_with_uv, uv_numbers
 from cembench.running.foreign_meshes import soup_of
 from cembench.running.surfaces import load_surface
 
@@ -34,18 +35,16 @@ def surface_and_uv(
         There is no surface, or not one finite UV for each vertex or corner.
 
     """
-    if isinstance(surface, str | os.PathLike) and not more:
-        path = Path(surface)
-        soup = read_soup_with_uv(path)
+    named = isinstance(surface, str | os.PathLike)
+    if named and not more:
+        soup = read_with_uv(Path(surface))
+        assert soup.uv is not None
         try:
-            return _usable(soup, _corners_of(soup))
+            return _usable(soup, np.append(soup.uv, np.nan)[uv_numbers(soup)])  # NO_UV is the last
         except MeshError as error:
-            raise located(error, path) from None
-    if isinstance(surface, str | os.PathLike):
-        mesh = load_surface(surface, (TriangleMesh,))
-        soup = Soup.of_triangles(mesh.V, mesh.F, name=mesh.name)
-    else:
-        soup = soup_of((surface, more[0]) if len(more) == 2 else surface)
+            raise located(error, Path(surface)) from None
+    whole = load_surface(surface, (TriangleMesh,)) if named else surface
+    soup = soup_of((whole, more[0]) if len(more) == 2 else whole)
     uv = more[-1] if more else _texture_coordinates(surface)
     if uv is None:
         raise MeshError(
@@ -65,30 +64,13 @@ def _texture_coordinates(surface: Any) -> Any:
 
 def _as_corners(uv: Any, soup: Soup) -> Complex:
     """Return UVs of vertices or of corners as complex numbers of the corners, (m, 3)."""
-    F, z = soup.triangles, array_of("UVs", uv, 2)
-    if z.dtype.kind != "c" and z.shape[-1:] == (2,):
-        z = complex_of(z).reshape(z.shape[:-1])
-    if z.dtype.kind != "c" or z.shape not in ((len(soup.V),), F.shape):
-        raise MeshError(
-            f"uv is of type {np.asarray(uv).dtype} and shape {np.shape(uv)}; allowed is one for "
-            f"each vertex, ({len(soup.V)}, 2) or complex ({len(soup.V)},), or for each corner, "
-            f"({len(F)}, 3, 2) or complex {F.shape}."
-        )
-    check_finite("uv is", z.ravel())
+    F, n = soup.triangles, len(soup.V)
+    allowed = (
+        f"one for each vertex, ({n}, 2) or complex ({n},), or for each corner, ({len(F)}, 3, 2) or "
+        f"complex {F.shape}"
+    )
+    z = complex_images(uv, [(n,), F.shape], allowed)
     return z if z.shape == F.shape else z[F]
-
-
-def _corners_of(soup: Soup) -> Complex:
-    """Return the UVs of the corners of a file, (m, 3); NaN where it has none."""
-    assert soup.uv is not None
-    index = soup.uv_triangles
-    bad = np.flatnonzero((index < NO_UV).ravel() | (index >= len(soup.uv)).ravel())
-    if len(bad):
-        raise MeshError(
-            f"corner {bad[0] % 3} of triangle {bad[0] // 3} has the UV number "
-            f"{index.flat[bad[0]]}, but there are {len(soup.uv)}. Export the file again."
-        )
-    return np.append(soup.uv, np.nan)[index]
 
 
 def _usable(soup: Soup, corners: Complex) -> tuple[TriangleMesh, Complex, tuple[str, ...]]:
@@ -97,7 +79,7 @@ def _usable(soup: Soup, corners: Complex) -> tuple[TriangleMesh, Complex, tuple[
     Vertices at the same position become one: many formats need copies of them along seams.
     """
     F = representatives(soup.V)[soup.triangles]
-    without = np.isnan(corners).any(axis=1, keepdims=True).ravel()
+    without: Mask = np.asarray(np.isnan(corners).any(axis=1))
     flat = ~without & ~(double_areas(soup.V, F) > 0)
     if (without | flat).all():
         raise MeshError("no triangle has UVs. Unwrap the surface, and export it with its UVs.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -50,17 +51,20 @@ def read(path: Path, *, uv: bool = False) -> Soup:
     F = np.concatenate(
         [np.asarray(m.faces, dtype=np.int64) + at for m, at in zip(meshes, first, strict=False)]
     )
-    more: dict[str, Any] = {}
-    if uv and (given := [getattr(mesh.visual, "uv", None) for mesh in meshes]):
-        blank = [np.full((len(mesh.vertices), 2), np.nan) for mesh in meshes]
-        pairs = zip(given, blank, strict=True)
-        found = [none if one is None or len(one) != len(none) else one for one, none in pairs]
-        if np.isfinite(every := np.concatenate(found)).any():
-            more = {"uv": complex_of(every), "uv_index": F.ravel()}
+    uv_index = F.ravel()
     apart, same = np.unique(V, axis=0, return_inverse=True)
     if len(apart) < len(V):
         V, F = apart, same.reshape(-1)[F]
-    return Soup.from_arrays(V, F, np.full(len(F), 3), notices=notices, **more)
+    soup = Soup.from_arrays(V, F, np.full(len(F), 3), notices=notices)
+    given = np.concatenate([_uv_of(mesh) for mesh in meshes]) if uv else np.empty((0, 2))
+    has_uv = bool(np.isfinite(given).any())
+    return replace(soup, uv=complex_of(given), uv_index=uv_index) if has_uv else soup
+
+
+def _uv_of(mesh: Any) -> NDArray[np.float64]:
+    """Return the first texture coordinates of a mesh (n, 2); NaN if it has none."""
+    uv = getattr(mesh.visual, "uv", None)
+    return np.full((len(mesh.vertices), 2), np.nan) if uv is None else np.asarray(uv, np.float64)
 
 
 def write(*surfaces: Soup, texture: Texture | None = None) -> bytes:

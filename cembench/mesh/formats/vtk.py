@@ -10,6 +10,7 @@ import base64
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import redirect_stderr
+from dataclasses import replace
 from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
@@ -145,10 +146,10 @@ def _by_vtk(path: Path) -> Soup:
     if not faces and ignored:
         raise MeshError(f"it holds only cells {', '.join(ignored)}: {_SOLID}.")
     corners = np.concatenate([*faces, []]).astype(np.int64)
-    given = data.GetPointData().GetTCoords()
-    uv = None if given is None else complex_of(vtk_to_numpy(given)[:, :2])
     sizes = [len(face) for face in faces]
-    return Soup.from_arrays(V, corners, sizes, notices=_ignored(ignored), uv=uv)
+    soup = Soup.from_arrays(V, corners, sizes, notices=_ignored(ignored))
+    given = data.GetPointData().GetTCoords()
+    return soup if given is None else replace(soup, uv=complex_of(vtk_to_numpy(given)[:, :2]))
 
 
 def _faces(corners: list[int], kind: int) -> list[list[int]]:
