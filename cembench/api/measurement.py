@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cembench.api.parameterize import parameterize
-from cembench.conformal.atlas import AtlasFigures, CutMap, cut_map, metrics_of
+from cembench.conformal.atlas import CutMap, cut_map, metrics_of
 from cembench.conformal.metrics import angle_errors, surface_areas
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import density_words, texel_density_ratio, texture_words
-from cembench.conformal.uv_quality import Place, layout_metrics, stretch_metrics, worst_places
+from cembench.conformal.uv_quality import UV_METRICS, Place, UvFigures, by_island, worst_places
 from cembench.core.arrays import Indices, Real
 from cembench.core.errors import CembenchError, MeshError
 from cembench.core.reporter import Reporter
+from cembench.core.wording import counted
 from cembench.mesh.topology import components
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.running.given_uvs import surface_and_uv
@@ -137,17 +138,17 @@ def measured(
 ) -> Measurement:
     """Return the figures of UVs; the arguments are those of :func:`cembench.measure`."""
     mesh, corners, notices = surface_and_uv(surface, more)
-    figures = AtlasFigures(cut_map(mesh, corners))
+    figures = UvFigures(cut_map(mesh, corners))
     with np.errstate(all="ignore"):
-        layout, islands = layout_metrics(figures)
-        values = metrics_of(figures) | stretch_metrics(figures) | layout
+        values = metrics_of(figures, UV_METRICS)
+        islands = tuple(by_island(figures))
         worst = worst_places(figures)
     metrics = {name: value if np.isfinite(value) else None for name, value in values.items()}
     best = _best(figures, mesh, reporter) if against else {}
-    return Measurement(mesh, figures.cut, metrics, tuple(islands), worst, notices, best)
+    return Measurement(mesh, figures.cut, metrics, islands, worst, notices, best)
 
 
-def _best(figures: AtlasFigures, mesh: TriangleMesh, reporter: Reporter) -> dict[str, Best]:
+def _best(figures: UvFigures, mesh: TriangleMesh, reporter: Reporter) -> dict[str, Best]:
     """Map the islands, and the surface without seams, anew."""
     with reporter.busy("mapping the islands anew") as say:
         cut = figures.cut
@@ -185,26 +186,24 @@ def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
     )
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}{'' if number == 1 else 's'}" if number else f"no {what}s"
+def _overlap(share: float | None, where: str) -> str:
+    if share is None:
+        return f"overlaps {where} cannot be told"
+    return f"{100 * share:.2g} % of the image overlaps {where}" if share else ""
 
 
 def _sentence(found: Measurement) -> str:
     """Return what the UVs are in a sentence."""
     m = found.metrics
     parts = [
-        _count(int(m["islands"] or 0), "island"),
+        counted(found.cut.islands, "island"),
         f"mean angle error {m['angle_error_mean_deg'] or 0:.2f} degrees",
-        _count(int(m["flipped_triangles"] or 0), "fold"),
-        *(
-            f"{100 * (m[name] or 0):.2g} % of the image overlaps {where}"
-            for name, where in OVERLAPS.items()
-            if m[name] != 0
-        ),
+        counted(int(folds), "fold") if (folds := m["flipped_triangles"]) else "no folds",
+        *(_overlap(m[name], where) for name, where in OVERLAPS.items()),
         texture_words(m),
         f"{100 * (m['covered_share'] or 0):.0f} % of the square covered",
     ]
-    return ", ".join(parts) + "."
+    return ", ".join(filter(None, parts)) + "."
 
 
 def _compared(found: Measurement) -> str:

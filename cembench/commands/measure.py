@@ -15,22 +15,12 @@ from cembench.commands.from_api import Call, from_api
 if TYPE_CHECKING:
     from cembench.api.measurement import Measurement
 
-#: Figures that are printed without --verbose, in this order, with their headings.
-FEW = {
-    "angle_error_mean_deg": "mean angle error, degrees",
-    "angle_error_sd_deg": "SD of angle errors",
-    "flipped_triangles": "folded triangles",
-    "symmetric_dirichlet": "symmetric Dirichlet energy (4: isometry)",
-    "area_distortion_mean": "mean area distortion",
-    "texel_density_ratio": "texel density, largest : smallest",
-    "islands": "islands",
-    "mirrored_islands": "mirrored islands",
-    "seam_length": "seam length",
-    "overlap_inside_islands": "overlap inside islands, share of the image",
-    "overlap_between_islands": "overlap between islands",
-    "covered_share": "share of the square that is covered",
-    "tiles": "tiles (UDIM)",
-}
+#: Figures that are printed without --verbose, in this order.
+FEW = (
+    *("angle_error_mean_deg", "angle_error_sd_deg", "flipped_triangles", "symmetric_dirichlet"),
+    *("area_distortion_mean", "texel_density_ratio", "islands", "mirrored_islands", "seam_length"),
+    *("overlap_inside_islands", "overlap_between_islands", "covered_share", "tiles"),
+)
 
 
 @app.command(
@@ -76,13 +66,18 @@ def measure(
 
 
 def _show(found: Measurement, *, verbose: bool) -> None:
+    from cembench.conformal.atlas import ATLAS_METRICS
+    from cembench.conformal.metrics import METRICS
+    from cembench.conformal.uv_quality import UV_METRICS
+
     for notice in found.notices:
         note(f"{found.mesh.name}: {notice}")
     out.print(f"{found.mesh.name}: {found.verdict}", style="bold")
+    known = {metric.name: metric for metric in (*METRICS, *ATLAS_METRICS, *UV_METRICS)}
     for name in found.metrics if verbose else FEW:
-        value = found.metrics[name]
-        text = "-" if value is None else f"{value:,.4g}" if value % 1 else f"{value:,.0f}"
-        out.print(f"{FEW.get(name, name):<45} {text}")
+        metric = known[name]
+        text = metric.text(found.metrics[name], precise=True)
+        out.print(f"{metric.title:<28} {text} {metric.unit}".rstrip())
     for place in found.worst:
         where = ", ".join(f"{x:.4g}" for x in place.position)
         out.print(

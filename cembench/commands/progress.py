@@ -18,6 +18,7 @@ from rich.progress_bar import ProgressBar
 from rich.table import Table
 from rich.text import Text
 
+from cembench.core.wording import counted
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.download import Progress
 from cembench.report.render.terminal import status_style
@@ -139,7 +140,7 @@ class PlainProgress(Watcher):
     def machines(self, names: Sequence[str]) -> None:
         """Print the number of workers; those of one machine take turns."""
         self.remaining.machines = max(1, len(set(names)))
-        self.shows(f"{len(names)} worker{'' if len(names) == 1 else 's'} there")
+        self.shows(f"{counted(len(names), 'worker')} there")
 
     def shows(self, words: str) -> None:
         """Print a remark; a live display stays below it."""

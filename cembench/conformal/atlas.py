@@ -8,6 +8,7 @@ are compared.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -166,7 +167,7 @@ def atlas_metrics(mesh: TriangleMesh, corners: Complex) -> dict[str, float | int
     return metrics_of(AtlasFigures(cut_map(mesh, corners)))
 
 
-def metrics_of(figures: AtlasFigures) -> dict[str, float | int]:
-    """Return the same of a surface that was cut before."""
+def metrics_of(figures: AtlasFigures, more: Sequence[Metric] = ()) -> dict[str, float | int]:
+    """Return the same of a surface that was cut before, and `more` of it."""
     chosen = [metric for metric in METRICS if metric.name not in _NOT_OF_AN_ATLAS]
-    return computed((*chosen, *ATLAS_METRICS), figures)
+    return computed((*chosen, *ATLAS_METRICS, *more), figures)

@@ -8,13 +8,15 @@ picture, and [u, u + 1] x [v, v + 1] the tile 1001 + u + 10 v.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from cembench.conformal.atlas import AtlasFigures, CutMap
+from cembench.conformal.metrics import MapFigures, Metric
 from cembench.conformal.planar import layered_areas
-from cembench.conformal.texel_density import undersampled_share
+from cembench.conformal.texel_density import SIDE, undersampled_share
 from cembench.core.arrays import Complex, Indices, Real
 
 #: Number of worst places, and their least distance as a share of the surface's diagonal.
@@ -51,89 +53,149 @@ class Place:
     angle_error_deg: float
 
 
-def singular_values(figures: AtlasFigures) -> Real:
-    """Return the stretches of each triangle, the larger first, (m, 2), at equal total area."""
-    F, uv, areas = figures.mesh.F, figures.uv, figures.areas
-    sides = np.abs(uv[np.roll(F, -1, axis=1)] - uv[np.roll(F, 1, axis=1)]) ** 2
-    images = np.abs(figures.image_areas)
-    with np.errstate(divide="ignore", invalid="ignore"):
+class UvFigures(AtlasFigures):
+    """Intermediate results for the metrics of given UVs, each computed once."""
+
+    def total(self, values: Real) -> Real:
+        """Return the sums of the values of triangles (m,) over each island."""
+        return np.asarray(np.bincount(self.cut.island, values, self.cut.islands), np.float64)
+
+    @cached_property
+    def stretches(self) -> Real:
+        """Singular values of each triangle, the larger first, (m, 2), at equal total area."""
+        F, uv, areas = self.mesh.F, self.uv, self.areas
+        sides = np.abs(uv[np.roll(F, -1, axis=1)] - uv[np.roll(F, 1, axis=1)]) ** 2
+        images = np.abs(self.image_areas)
         scale = areas.sum() / images.sum()
-        squares = scale * (figures.half_cotangents * sides).sum(axis=1) / areas
+        squares = scale * (self.half_cotangents * sides).sum(axis=1) / areas
         product = scale * images / areas
-    total, difference = (np.sqrt(np.maximum(squares + k * product, 0)) for k in (2, -2))
-    return np.stack([total + difference, total - difference], axis=1) / 2
+        total, difference = (np.sqrt(np.maximum(squares + k * product, 0)) for k in (2, -2))
+        return np.stack([total + difference, total - difference], axis=1) / 2
+
+    @cached_property
+    def symmetric_dirichlet(self) -> float:
+        """Mean of s1^2 + s2^2 + 1 / s1^2 + 1 / s2^2; infinite with a folded triangle."""
+        if self.folds.any():
+            return float("inf")
+        density = (self.stretches**2 + self.stretches**-2.0).sum(axis=1)
+        return float(self.areas @ density / self.areas.sum())
+
+    def stretch(self, column: int, share: float) -> float:
+        """Return the singular value that this share of the surface does not exceed."""
+        order = np.argsort(self.stretches[:, column])
+        below = np.cumsum(self.areas[order]) / self.areas.sum()
+        at = min(int(np.searchsorted(below, share)), len(order) - 1)
+        return float(self.stretches[order[at], column])
+
+    @cached_property
+    def whole(self) -> float:
+        """Area of the image, folds and layers counted."""
+        return float(np.abs(self.image_areas).sum())
+
+    @cached_property
+    def layers(self) -> tuple[Real, float, float]:
+        """Area that each island has over itself, of all layers, and above the lowest one.
+
+        NaN where outlines cross too often to tell.
+        """
+        starts, ends, first = _outlines(self.cut)
+        pieces = zip(np.split(starts, first), np.split(ends, first), strict=True)
+        inside = np.array([layered_areas(*sides)[1] for sides in pieces])
+        return inside, *layered_areas(starts, ends)
+
+    @cached_property
+    def tiles(self) -> Complex:
+        """The lower left corner of each island's tile, (islands,)."""
+        middle = self.cut.given[self.mesh.F].mean(axis=1)
+        count = np.bincount(self.cut.island, minlength=self.cut.islands)
+        u, v = (np.floor(self.total(part) / count) for part in (middle.real, middle.imag))
+        return np.asarray(u + 1j * v)
+
+    @cached_property
+    def beyond(self) -> int:
+        """Number of islands that reach beyond their tile."""
+        away = self.cut.given[self.mesh.F] - self.tiles[self.cut.island, None] - (0.5 + 0.5j)
+        far = np.maximum(np.abs(away.real), np.abs(away.imag)).max(axis=1) > 0.5 + EDGE
+        return int((self.total(far.astype(np.float64)) > 0).sum())
 
 
-def stretch_metrics(figures: AtlasFigures) -> dict[str, float]:
-    """Return the symmetric Dirichlet energy and quantiles of the singular values, by area.
-
-    The energy is the mean over the surface of ``s1^2 + s2^2 + 1 / s1^2 + 1 / s2^2`` at equal total
-    area: 4 for an isometry, infinite with a folded or collapsed triangle (Smith and Schaefer 2015).
-    """
-    stretch, weights = singular_values(figures), figures.areas / figures.areas.sum()
-    with np.errstate(divide="ignore", over="ignore"):
-        density = (stretch**2 + stretch**-2.0).sum(axis=1)
-    energy = float("inf") if figures.folds.any() else float(weights @ density)
-    found = {"symmetric_dirichlet": energy}
-    for name, values in (("largest", stretch[:, 0]), ("smallest", stretch[:, 1])):
-        order = np.argsort(values)
-        at = np.searchsorted(np.cumsum(weights[order]), QUANTILES)
-        for share, k in zip(QUANTILES, np.minimum(at, len(order) - 1), strict=True):
-            found[f"{name}_stretch_{round(100 * share)}%"] = float(values[order[k]])
-    return found
+def _uv(figures: MapFigures) -> UvFigures:
+    assert isinstance(figures, UvFigures)
+    return figures
 
 
-def layout_metrics(figures: AtlasFigures) -> tuple[dict[str, float], list[dict[str, Any]]]:
-    """Return overlaps, tiles and coverage of a layout, and the figures of each island.
+def _stretch(column: int, share: float) -> Metric:
+    name, most = ("largest", "smallest")[column], f"{100 * share:.0f}%"
+    return Metric(
+        f"{name}_stretch_{most}", f"{name} stretch, {most}", "", "", ".3g", ".4g",
+        f"what the {name} singular value does not exceed on {most} of the surface",
+        lambda f: _uv(f).stretch(column, share), better=None,
+    )  # fmt: skip
 
-    An overlap is a share of the image's area, NaN where outlines cross too often to tell.
-    """
-    cut = figures.cut
-    F, island, count = cut.surface.F, cut.island, cut.islands
 
-    def total(values: Real) -> Real:
-        return np.asarray(np.bincount(island, values, count), dtype=np.float64)
+#: The metrics that only given UVs have; the last one takes the unit square as the texture.
+UV_METRICS: tuple[Metric, ...] = (
+    Metric(
+        "symmetric_dirichlet", "symmetric Dirichlet energy", "", "(4 for an isometry)", ".3f",
+        ".4f", "mean over the surface of s1^2 + s2^2 + 1 / s1^2 + 1 / s2^2, s its stretches at "
+        "equal total area (Smith and Schaefer 2015)",
+        lambda f: _uv(f).symmetric_dirichlet,
+    ),
+    *(_stretch(column, share) for column in (0, 1) for share in QUANTILES),
+    Metric(
+        "overlap_inside_islands", "overlap inside islands", "", "of the image", ".1e", ".2g",
+        "share of the image by which islands lie over themselves",
+        lambda f: float(_uv(f).layers[0].sum() / _uv(f).whole),
+    ),
+    Metric(
+        "overlap_between_islands", "overlap between islands", "", "of the image", ".1e", ".2g",
+        "share of the image by which islands lie over others",
+        lambda f: float(
+            np.maximum(_uv(f).layers[2] - _uv(f).layers[0].sum(), 0.0) / _uv(f).whole
+        ),
+    ),
+    Metric(
+        "tiles", "tiles (UDIM)", "", "", ".0f", ".0f", "unit squares that hold an island",
+        lambda f: len(np.unique(_uv(f).tiles)), better=None,
+    ),
+    Metric(
+        "covered_share", "covered", "", "of the tiles", ".2f", ".2f",
+        "share of the tiles that is covered",
+        lambda f: (_uv(f).layers[1] - _uv(f).layers[2]) / len(np.unique(_uv(f).tiles)),
+        better=None,
+    ),
+    Metric(
+        "islands_beyond_their_tile", "islands beyond their tile", "", "", ".0f", ".0f",
+        "islands of which a part lies outside the tile of their centre",
+        lambda f: _uv(f).beyond,
+    ),
+    Metric(
+        "undersampled_share", "undersampled", "", "of the surface", ".1e", ".2g",
+        f"share of the surface with less than 1 texel for each ten-thousandth, at {SIDE:,} px",
+        lambda f: undersampled_share(f.areas, f.image_areas, 1.0),
+    ),
+)  # fmt: skip
 
+
+def by_island(figures: UvFigures) -> list[dict[str, Any]]:
+    """Return the figures of each island, in the order of their numbers."""
+    cut, total = figures.cut, figures.total
     images, areas = total(np.abs(figures.image_areas)), total(figures.areas)
-    triangles = np.bincount(island, minlength=count)
-    starts, ends, first = _outlines(cut)
-    pieces = zip(np.split(starts, first), np.split(ends, first), strict=True)
-    inside = np.array([layered_areas(*sides)[1] for sides in pieces])
-    covered, over = layered_areas(starts, ends)
-    corners = cut.given[F]
-    middle = total(corners.real.mean(axis=1)) + 1j * total(corners.imag.mean(axis=1))
-    tile = np.floor(middle.real / triangles) + 1j * np.floor(middle.imag / triangles)
-    away = corners - tile[island, None] - (0.5 + 0.5j)
-    beyond = np.maximum(np.abs(away.real), np.abs(away.imag)).max(axis=1) > 0.5 + EDGE
-    density = np.sqrt(images / areas)
-    whole = images.sum()
-    metrics: dict[str, float] = {
-        "overlap_inside_islands": float(inside.sum() / whole),
-        "overlap_between_islands": float(max(over - inside.sum(), 0.0) / whole),
-        "tiles": len(np.unique(tile)),
-        "covered_share": float((covered - over) / len(np.unique(tile))),
-        "islands_beyond_their_tile": int((total(beyond) > 0).sum()),
-        "undersampled_share": undersampled_share(figures.areas, figures.image_areas, 1.0),
-    }
+    triangles = np.bincount(cut.island, minlength=cut.islands)
+    tile = figures.tiles
     each = {
         "triangles": triangles,
         "surface_share": areas / areas.sum(),
-        "image_share": images / whole,
+        "image_share": images / figures.whole,
         "angle_error_mean_deg": total(figures.angle_errors.mean(axis=1)) / triangles,
         "flipped_triangles": figures.folds,
-        "texel_density": density / np.sqrt(whole / areas.sum()),
-        "overlap": inside / images,
+        "texel_density": np.sqrt(images / areas / (figures.whole / areas.sum())),
+        "overlap": figures.layers[0] / images,
         "mirrored": cut.turned,
         "tile": (1001 + tile.real + 10 * tile.imag).astype(np.int64),
     }
-    rows = [
-        dict(zip(each, row, strict=True)) for row in zip(*map(_plain, each.values()), strict=True)
-    ]
-    return metrics, rows
-
-
-def _plain(values: Any) -> list[Any]:
-    return list(np.asarray(values).tolist())
+    columns = [np.asarray(values).tolist() for values in each.values()]
+    return [dict(zip(each, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
 def _outlines(cut: CutMap) -> tuple[Complex, Complex, Indices]:

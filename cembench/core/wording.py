@@ -8,6 +8,15 @@ from string import Formatter
 from typing import Any
 
 
+def counted(number: int, noun: str) -> str:
+    """Return a number of things in words.
+
+    >>> counted(1, "island"), counted(2500, "fold")
+    ('1 island', '2,500 folds')
+    """
+    return f"{number:,} {noun}{'' if number == 1 else 's'}"
+
+
 @dataclass(frozen=True)
 class Setting:
     """An argument in a message: its name and, unless empty, its value as Python writes it."""

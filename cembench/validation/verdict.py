@@ -11,6 +11,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from cembench.core.wording import counted
 from cembench.results.comparison import Comparison
 from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
@@ -135,12 +136,13 @@ def _energy_words(against: BaselineComparison) -> str:
     energy = against.energy_name
     if not compared.surfaces:
         return f"{energy} not compared with {title}: no surface that both map"
+    of = counted(compared.surfaces, "surface")
     if compared.equal == compared.surfaces:
         text = f"{energy} equal to {title}'s within 1 % on {_all(compared.surfaces)}"
     elif compared.lower >= compared.higher:
-        text = f"{energy} lower than {title} on {compared.lower} of {_count(compared.surfaces)}"
+        text = f"{energy} lower than {title} on {compared.lower} of {of}"
     else:
-        text = f"{energy} higher than {title} on {compared.higher} of {_count(compared.surfaces)}"
+        text = f"{energy} higher than {title} on {compared.higher} of {of}"
     if 0 < compared.equal < compared.surfaces:
         other = min(compared.lower, compared.higher)
         side = "higher" if compared.lower >= compared.higher else "lower"
@@ -211,11 +213,7 @@ def _meets_against(requirement: Requirement, against: BaselineComparison) -> boo
 
 
 def _surfaces(names: Sequence[str]) -> str:
-    return f"{_count(len(names))}: {', '.join(names)}"
-
-
-def _count(number: int) -> str:
-    return f"{number} surface{'' if number == 1 else 's'}"
+    return f"{counted(len(names), 'surface')}: {', '.join(names)}"
 
 
 def _all(number: int) -> str:

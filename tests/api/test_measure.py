@@ -193,3 +193,31 @@ def test_uvs_of_another_shape_or_missing_are_refused(mapped):
         cembench.measure(mapped.mesh)
     with pytest.raises(MeshError, match="NaN"):
         cembench.measure(mapped.mesh, mapped.uv * np.nan)
+
+
+def test_off_files_and_uvs_of_vertices_that_corners_do_not_name(tmp_path):
+    lines = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "vt 0 0", "vt 1 0", "vt 1 1", "f 1 2 3", ""]
+    (tmp_path / "a.obj").write_text("\n".join(lines))
+    rows = ["STOFF", "3 1 0", "0 0 0 0 0", "1 0 0 1 0", "1 1 0 1 1", "3 0 1 2", ""]
+    (tmp_path / "a.off").write_text("\n".join(rows))
+    for name in ("a.obj", "a.off"):
+        assert cembench.measure(tmp_path / name).metrics["symmetric_dirichlet"] == pytest.approx(4)
+
+
+def test_points_with_uvs_and_no_faces_are_no_surface(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    points = pyvista.PolyData(np.eye(3))
+    points.verts = np.empty(0, dtype=np.int64)
+    points.active_texture_coordinates = np.eye(3)[:, :2]
+    points.save(tmp_path / "a.vtp")
+    for call in (cembench.read_mesh, cembench.measure):
+        with pytest.raises(MeshError, match="no faces"):
+            call(tmp_path / "a.vtp")
+
+
+def test_overlaps_that_cannot_be_told_are_not_called_none(monkeypatch):
+    monkeypatch.setattr("cembench.conformal.planar.MOST_CROSSINGS", -(10**9))
+    V, F, uv = square(3)
+    found = cembench.measure(V, F, uv)
+    assert found.metrics["overlap_between_islands"] is None
+    assert "overlaps between islands cannot be told" in found.verdict
