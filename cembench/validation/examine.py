@@ -229,9 +229,7 @@ def _quality(work: _Work) -> _Found:
 
 def _scaling(work: _Work) -> _Found:
     meshes = surfaces.growing(work.registry, work.kind, sizes(work.asked.up_to))
-    reference = _GROWTH_REFERENCE[work.solver.algorithm.target]
-    known = reference in work.registry.algorithms and reference != work.name
-    beside = (reference,) if known else ()
+    beside = usual_rival(work.solver.algorithm, work.registry, _GROWTH_REFERENCE)
     others = tuple(dict.fromkeys((*beside, *work.baselines)))
     started = monotonic()
     sittings = [work.measured("scaling", meshes, others, FIRST_ROUNDS)]
@@ -271,10 +269,24 @@ def _is_asked(stage: Stage, asked: ValidationOptions) -> bool:
     return not asked.checks_only and (stage == "quality" or asked.up_to > 0)
 
 
+def fits(algorithm: Algorithm, other: Algorithm) -> bool:
+    """Whether an algorithm can be compared with another one: it takes the same surfaces."""
+    kind = surfaces.mesh_kind(algorithm)
+    return other.name != algorithm.name and issubclass(kind, other.mesh_type)
+
+
+def usual_rival(
+    algorithm: Algorithm, registry: Registry, of_targets: Mapping[str, str]
+) -> tuple[str, ...]:
+    """Return the algorithm that those of a target are compared with; none if it does not fit."""
+    other = registry.algorithms.get(of_targets.get(algorithm.target, ""))
+    return (other.name,) if other and fits(algorithm, other) else ()
+
+
 def baselines(
     algorithm: Algorithm, registry: Registry, asked: Sequence[str] | None
 ) -> tuple[str, ...]:
-    """Return the names of the baselines; by default the usual one of the target, if installed.
+    """Return the names of the baselines; by default the usual one of the target, if it fits.
 
     Raises
     ------
@@ -285,23 +297,16 @@ def baselines(
 
     """
     if asked is None:
-        usual = USUAL_REFERENCES.get(algorithm.target, "")
-        return (usual,) if usual in registry.algorithms and usual != algorithm.name else ()
-    kind = surfaces.mesh_kind(algorithm)
+        return usual_rival(algorithm, registry, USUAL_REFERENCES)
     for name in asked:
-        other = registry.algorithm(name)
-        if name == algorithm.name or not issubclass(kind, other.mesh_type):
-            fits = ", ".join(
-                a.name
-                for a in registry.algorithms.values()
-                if issubclass(kind, a.mesh_type) and a.name != algorithm.name
-            )
+        if not fits(algorithm, registry.algorithm(name)):
+            fitting = [one.name for one in registry.algorithms.values() if fits(algorithm, one)]
             raise ParameterError.about(
                 "{given}: {solver} cannot be compared with it; algorithms that take a {kind}: "
                 "{fits}.",
                 given=Setting("against", repr(name)),
                 solver=algorithm.name,
-                kind=kind.__name__,
-                fits=fits or "none",
+                kind=surfaces.mesh_kind(algorithm).__name__,
+                fits=", ".join(fitting) or "none",
             )
     return tuple(dict.fromkeys(asked))
