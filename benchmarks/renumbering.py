@@ -15,7 +15,7 @@ from benchmarks.measuring import in_fresh_process, in_turns, progress, read_surf
 from benchmarks.pages import Section, Table
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.comparison import ratio_interval
-from cembench.running.rigid_motion import moved
+from cembench.running.rigid_motion import THEN, moved
 
 LAYOUT = """
 | surface | blocks / shifts | 95 % interval | scatter of pairs, shifts | blocks |
@@ -34,12 +34,16 @@ def renumbering(
 
     Each process times the algorithm on surfaces of either kind in turns, every call on another one.
     The ratio is that of both medians of a process; a pair is two processes, and their scatter the
-    standard deviation of the logarithm of the ratio of their medians. Nothing else should run on
-    the machine. Surfaces are named as in `limit`.
+    standard deviation of the logarithm of the ratio of their medians. As in a run, the processes
+    of a pair get the same blocks; shifts are drawn by each. Nothing else should run on the machine.
+    Surfaces are named as in `limit`.
     """
     rows = []
     for surface in progress(surfaces):
-        timed = [in_fresh_process(measure, surface, algorithm, calls) for _ in range(processes)]
+        timed = [
+            in_fresh_process(measure, surface, algorithm, calls, f"{number // 2}")
+            for number in range(processes)
+        ]
         rows.append(row(surface, timed))
     how = f"{algorithm}, {processes} processes, {calls} calls of each kind in each. A number is a "
     return Section([Table(rows, LAYOUT), f"{how}spherical cap of so many triangles."])
@@ -60,22 +64,22 @@ def row(surface: str, timed: Sequence[dict[str, float]]) -> dict[str, Any]:
     } | scatter
 
 
-def measure(surface: str, algorithm: str, calls: int) -> dict[str, float]:
-    """Return the median seconds of calls on shifted surfaces, and on those in blocks."""
+def measure(surface: str, algorithm: str, calls: int, pair: str) -> dict[str, float]:
+    """Return the median seconds of calls on shifted surfaces, and on those in a pair's blocks."""
     from cembench.linear_algebra.cholesky import linear_algebra
     from cembench.registry import load_registry
 
     mesh, known = read_surface(surface), load_registry().algorithm(algorithm)
     chance = random.SystemRandom()
     kinds = {
-        "shifts": lambda: shifted(mesh, chance.getrandbits(60)),
-        "blocks": lambda: moved(mesh, f"{chance.getrandbits(60):x}"),
+        "shifts": lambda _: shifted(mesh, chance.getrandbits(60)),
+        "blocks": lambda call: moved(mesh, f"{pair}-{call}{THEN}{chance.getrandbits(60):x}"),
     }
     seconds: dict[str, list[float]] = {kind: [] for kind in kinds}
     with linear_algebra():
         for k in range(calls + 1):
             for kind in chance.sample(list(kinds), len(kinds)):
-                own = kinds[kind]()
+                own = kinds[kind](k)
                 timings = in_turns({kind: lambda own=own: known.function(own)}, 1, warm_up=0)
                 seconds[kind] += [timings[kind][0].total] if k else []
     return {kind: median(one) for kind, one in seconds.items()}

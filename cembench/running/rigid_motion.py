@@ -29,6 +29,8 @@ UNMOVED = ""
 NUMBERS_KEPT = " (numbers kept)"
 #: What stands for the name of a motion that is drawn when its call begins.
 DRAWN_LATER = "?"
+#: What ends the name of a numbering where a motion's name begins with one.
+THEN = "/"
 #: Number of blocks that are permuted, a prime, and how far their ends are moved, in lengths of one.
 #: With five no shift puts a third of the numbers in place; with more, orderings of well-numbered
 #: meshes take longer (`python -m benchmarks renumbering`).
@@ -80,11 +82,12 @@ def numbering(name: str, n: int, m: int) -> tuple[Indices, Indices, Indices]:
     """Return the order of vertices (n,) and triangles (m,) of a named motion, and their turns (m,).
 
     A row of the order is the place where the surface itself has it; a triangle that comes there is
-    turned by so many corners.
+    turned by so many corners. Motions whose names begin with the same numbering share it.
     """
     if name == UNMOVED or name.endswith(NUMBERS_KEPT):
         return np.arange(n), np.arange(m), np.zeros(m, dtype=np.int64)
-    seed = int.from_bytes(hashlib.sha256(f"numbers {name}".encode()).digest()[:8], "little")
+    shared = name.partition(THEN)[0]
+    seed = int.from_bytes(hashlib.sha256(f"numbers {shared}".encode()).digest()[:8], "little")
     rng = np.random.default_rng(seed)
     vertices, triangles = (np.concatenate(_blocks(rng, count)) for count in (n, m))
     turns = [np.full(len(block), rng.integers(3)) for block in _blocks(rng, m)]

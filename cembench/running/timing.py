@@ -12,6 +12,7 @@ import threading
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from os import urandom
 from pathlib import Path
 from time import monotonic
 from typing import Any, Self
@@ -36,7 +37,14 @@ from cembench.running.map_checks import (
 from cembench.running.measure import ENOUGH_CALLS, LONG_CALL
 from cembench.running.options import Options
 from cembench.running.plan import Task
-from cembench.running.rigid_motion import DRAWN_LATER, NUMBERS_KEPT, UNMOVED, in_first_order, may_be
+from cembench.running.rigid_motion import (
+    DRAWN_LATER,
+    NUMBERS_KEPT,
+    THEN,
+    UNMOVED,
+    in_first_order,
+    may_be,
+)
 from cembench.running.timing_checks import impossible, incomparable
 from cembench.running.worker import Part, TimedPart
 
@@ -74,6 +82,7 @@ class CellTimer:
     ) -> None:
         self.launcher = Launcher(scratch, options, forks=forks, stopped=stopped)
         self._cells: dict[str, _History] = {}
+        self._numbering = urandom(6).hex()
 
     def for_checks(self, jobs: int) -> list[Self]:
         """Return `jobs` timers that may check at the same time, and add to what this one knows.
@@ -180,7 +189,8 @@ class CellTimer:
     def _part(self, number: int, task: Task) -> Part:
         """Return what the next process of a cell makes, alone or with others.
 
-        Its surfaces are moved and renumbered, by motions that are drawn when their calls begin.
+        Its surfaces are moved by motions that are drawn when their calls begin, and renumbered: in
+        a round, the same call of all cells gets the same numbers, since seconds depend on them.
         Where calls are short, the first one, which only warms up, gets a motion that a call of the
         process before has had. A cell's first process makes another call that is not timed, whose
         surface keeps its numbers: what is stored by the triangles shows in its map. Where calls are
@@ -190,7 +200,10 @@ class CellTimer:
         is_first = not history.timed
         history.timed += 1
         ending = NUMBERS_KEPT if task.algorithm.target == "atlas" else ""
-        motions = [f"{DRAWN_LATER}{ending}"] * (ENOUGH_CALLS + 2)
+        numbering = f"{self._numbering}-{history.timed}"
+        motions = [
+            f"{numbering}-{call}{THEN}{DRAWN_LATER}{ending}" for call in range(ENOUGH_CALLS + 2)
+        ]
         if is_first:
             motions[1] = f"{DRAWN_LATER}{NUMBERS_KEPT}"
         replays = history.last is not None and history.first_seconds <= LONG_CALL

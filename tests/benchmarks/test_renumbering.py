@@ -6,7 +6,7 @@ from benchmarks.renumbering import LAYOUT, measure, row
 
 
 def test_a_process_times_both_kinds():
-    seconds = in_fresh_process(measure, "600", "cem", 1)
+    seconds = in_fresh_process(measure, "600", "cem", 1, "0")
     assert seconds.keys() == {"shifts", "blocks"}
     assert min(seconds.values()) > 0
 

@@ -1,5 +1,7 @@
 """Rounds in which compared algorithms share a process, besides having one each."""
 
+from itertools import chain
+
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
@@ -16,6 +18,7 @@ from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.pairing import PROCESSES, Scatter
 from cembench.running.plan import MeasurementSettings, plan_cells
+from cembench.running.rigid_motion import THEN
 from cembench.running.timing import CellTimer
 from cembench.running.watcher import Watcher
 from tests.records import changed
@@ -171,6 +174,22 @@ def test_every_round_has_both_kinds_of_processes(tmp_path):
             assert len(one.together) > 1
             assert one.repeated
     assert Store(tmp_path).records()[0].outcome.rounds[0].together
+
+
+def test_the_calls_of_a_round_get_the_same_numbers_in_all_cells(tmp_path):
+    """Seconds depend on the numbering, and ratios should not."""
+    records = measured(["cem", "harmonic-circle"], flat_disk(300), tmp_path, 2).values()
+    every = [[numbers(one) for one in record.outcome.rounds] for record in records]
+    for own, other in zip(*every, strict=True):
+        shared = min(len(own), len(other))
+        assert own[:shared] == other[:shared]
+    assert len(set(chain(*every[0]))) == sum(map(len, every[0]))
+
+
+def numbers(one):
+    """Return the numberings of a round's calls; the first call repeats one of the round before."""
+    motions = [motion.partition(THEN) for motion in one.motions.split("; ")[1:]]
+    return [numbering for numbering, then, _ in motions if then]
 
 
 def test_one_process_makes_the_calls_of_twins(tmp_path):

@@ -15,6 +15,7 @@ from cembench.running.rigid_motion import (
     DRAWN_LATER,
     NUMBERS_KEPT,
     STRETCH,
+    THEN,
     UNMOVED,
     drawn,
     in_first_order,
@@ -141,6 +142,14 @@ def test_a_renumbered_surface_is_the_same_surface_with_all_numbers_changed():
     np.testing.assert_array_equal(back, own)
     assert type(MESH)(surface.V, surface.F).m == MESH.m  # it passes all checks
     np.testing.assert_array_equal(in_first_order(FLAT[vertices], MESH, "a"), FLAT)
+
+
+def test_motions_may_share_a_numbering():
+    """Seconds depend on the numbering: cells that are compared get the same one."""
+    first, second = (drawn(f"a{THEN}{DRAWN_LATER}") for _ in range(2))
+    np.testing.assert_array_equal(moved(MESH, first).F, moved(MESH, second).F)
+    assert moved(MESH, first).hash != moved(MESH, second).hash
+    assert not np.array_equal(moved(MESH, first).F, moved(MESH, drawn(f"b{THEN}{DRAWN_LATER}")).F)
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 4, 100, 10_000])
