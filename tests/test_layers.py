@@ -73,7 +73,7 @@ BUDGETS = {
     "conformal": 6_780,
     "registry": 970,
     "results": 5_400,
-    "running": 7_700,
+    "running": 7_720,
     "drawing": 1_500,
     "report": 8_230,
     "validation": 2_380,
