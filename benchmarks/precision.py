@@ -95,7 +95,7 @@ def precision(*, runs: int = 4000) -> Section:
     over.
     """
     rows, corrected = [], []
-    for model, width in product(noise.MODELS, (0.02, USUAL_PRECISION, 0.1)):
+    for model, width in product(noise.MODELS, (USUAL_PRECISION, 0.1)):
         simulated = simulate(model, runs, width)
         rows.append(
             {

@@ -15,14 +15,13 @@ from cembench.surfaces.rows import ROWS
 
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
-from cembench.conformal.laplacian import half_cotangents, non_delaunay_share
+from cembench.conformal.laplacian import half_cotangents
 from cembench.conformal.metrics import all_metrics, angle_errors
 from cembench.mesh.datasets import is_fetched
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import load_registry
 from cembench.report.document import ORIGINS
-from cembench.report.surface_facts import factor_spans
 from cembench.results.columns import FITTED
 from cembench.results.papers import find_paper
 from cembench.running.plan import distribute_parameters, provenance_of
@@ -35,11 +34,6 @@ ANATOMY_BY = "direct-cem"
 PRINTED, MODEL, OLD, CALIBRATED = "printed", "model", "old stand-in", "stand-in"
 #: Rows of which other seeds are measured, and how many.
 SEEDS = 10
-COUNTS = """
-| surface | faces | boundary | row's faces | row's boundary | not Delaunay | span |
-|---|---:|---:|---:|---:|---:|---:|
-| {name} | {faces:,} | {boundary:,} | {row_faces:,} | {row_boundary:,} | {thin:.1%} \
-| {span:.1e} |"""
 FIGURES = """
 | row | | FDM: E_C | mean | SD | LDM: E_C | mean | SD | CEM: E_C | mean | SD | iterations |
 |---|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|---:|
@@ -76,7 +70,7 @@ def surfaces_page(
     fetched = [d.path for d in registry.datasets.values() if d.paper_row and is_fetched(d)]
     models = dict(known_models([*mesh, *fetched]))
     names = [name for name, row in ROWS.items() if row.faces <= most]
-    lines, counts = [], []
+    lines = []
     for name in progress(names):
         row = ROWS[name]
         lines.append({"row": row.model, "kind": PRINTED, **in_print(row.model)})
@@ -87,10 +81,7 @@ def surfaces_page(
             figures = measured(surface, row.model if kind == MODEL else "")
             anatomy = anatomy_of(surface) if row.model in models else {}
             lines.append({"row": row.model, "kind": kind, **figures, **anatomy})
-        counts.append(counts_of(name, made[CALIBRATED]))
     parts = [
-        "### Counts",
-        Table(counts, COUNTS),
         "### Energies and angle errors",
         Table([as_text(line) for line in lines], FIGURES),
         "### What is predicted",
@@ -135,21 +126,6 @@ def measured(mesh: TriangleMesh, model: str = "") -> dict[str, Any]:
         if mapper.name == "cem":
             found["iterations"] = result.iterations
     return found
-
-
-def counts_of(name: str, mesh: DiskMesh) -> dict[str, Any]:
-    """Return the counts of a stand-in beside those of its row, and the span of the scale."""
-    cem, row = load_registry().algorithm("cem"), ROWS[name]
-    uv = cem.function(mesh.fresh(), **cem.arguments({})).uv
-    return {
-        "name": name,
-        "faces": mesh.m,
-        "boundary": len(mesh.loops[0]),
-        "row_faces": row.faces,
-        "row_boundary": row.boundary,
-        "thin": non_delaunay_share(mesh),
-        "span": factor_spans(mesh, uv)["conformal_factor_span"],
-    }
 
 
 def as_text(line: Figures) -> dict[str, Any]:

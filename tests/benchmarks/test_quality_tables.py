@@ -30,11 +30,11 @@ def test_a_torus_is_cut_and_mapped(tmp_path):
 def test_sweeps_are_counted_until_one_more_gives_little(tmp_path):
     write_mesh(tmp_path / "ring.obj", holed_disk(300, holes=1))
     found = rows(koebe_sweeps.koebe_sweeps([tmp_path / "ring.obj"], most=3))
-    filled, once, *more, direct = found
-    assert [one["map"] for one in (filled, once)] == ["`harmonic-filled`", "`koebe-cem`, sweeps=1"]
+    once, *more = found
+    assert once["sweeps"] == 1
     assert len(more) <= 1
-    assert direct["energy"] <= 1.001 * min(one["energy"] for one in found)
-    assert direct["off"] is None
+    assert all(one["energy"] < once["energy"] and one["sweeps"] <= 3 for one in more)
+    assert all(one["folds"] == 0 and one["off"] > 0 for one in found)
 
 
 def test_only_maps_with_folds_are_tabulated_with_what_the_repair_did(tmp_path):
