@@ -62,10 +62,10 @@ def validate(
     folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
     if as_json:
-        from cembench.validation.verdict import sentence
+        from cembench.validation.verdict import sentences
 
         verdict: dict[str, Any] = {"valid": validation.valid, "passed": validation.passed}
-        verdict |= {"verdict": sentence(validation)}
+        verdict |= {"verdict": " ".join(sentences(validation))}
         print_json(verdict | validation.model_dump(mode="json") | written)
     else:
         from cembench.validation.document import validation_text

@@ -33,7 +33,7 @@ from cembench.validation.finding import ValidationFinding
 from cembench.validation.quality import BaselineComparison, Pair
 from cembench.validation.scaling import Growth, GrowthComparison
 from cembench.validation.solver import CheckedMap, worst_of
-from cembench.validation.verdict import STAGES, Validation, sentence
+from cembench.validation.verdict import STAGES, Validation, sentences
 
 if TYPE_CHECKING:
     from rich.console import RenderableType
@@ -60,7 +60,7 @@ def validation_text(validation: Validation) -> RenderableType:
 
     sections = [section for section in stage_sections(validation, {}) if section.items]
     style = "bold green" if validation.passed else "bold red"
-    verdict = RichText(f"{validation.title}: {sentence(validation)}.", style=style)
+    verdict = RichText(f"{validation.title}: {' '.join(sentences(validation))}", style=style)
     return Group(*(part for section in sections for part in (section, "")), verdict)
 
 
@@ -86,6 +86,7 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
         ("environment", validation.environment),
         ("examined in", f"{validation.seconds:.0f} s"),
     )
+    first, *rest = sentences(validation)
     used = {key for against in validation.against for p in against.pairs for key in p.records}
     return Report(
         title=f"Validation of {validation.title}",
@@ -93,7 +94,9 @@ def document_of(validation: Validation, runs: Path, folder: Path) -> Report:
         facts=facts,
         sections=tuple(sections),
         records={key: row(record) for key, record in records.items() if key in used},
-        findings=Findings(((f"{validation.title}: {sentence(validation)}.",),), picture=worst),
+        findings=Findings(
+            ((f"{validation.title}: {first}",), *((one,) for one in rest)), picture=worst
+        ),
     )
 
 

@@ -56,13 +56,13 @@ def is_higher_at_last(compared: BaselineComparison) -> bool:
     return bool(ratios) and ratios[-1] > 1 + TIE
 
 
-def looked_at_words(looked_at: LookedAt) -> str:
-    """Return which sizes each stage has seen, as a clause."""
+def looked_at_sentence(looked_at: LookedAt) -> str:
+    """Return which sizes each stage has seen."""
     parts = [
         f"{stage} {low:,} to {high:,}" if low < high else f"{stage} {low:,}"
         for stage, (low, high) in looked_at.items()
     ]
-    return f"looked at, in triangles: {', '.join(parts)}"
+    return f"Looked at, in triangles: {', '.join(parts)}."
 
 
 def _by_size(compared: BaselineComparison) -> list[Pair]:

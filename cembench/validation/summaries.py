@@ -11,7 +11,7 @@ from cembench.core.loading import is_there, read_bytes
 from cembench.report.document import Section, Text
 from cembench.report.render.markdown import append_section
 from cembench.validation.document import stage_sections
-from cembench.validation.verdict import STAGES, Validation, sentence
+from cembench.validation.verdict import STAGES, Validation, sentences
 
 #: How a file of ours begins, after the declaration of XML.
 _OURS = b'<testsuites name="cembench validate"'
@@ -32,7 +32,7 @@ def append_markdown(validation: Validation, path: Path) -> None:
     title = f"{sign} {validation.title}: {'passed' if validation.passed else 'did not pass'}"
     stages = [section for section in stage_sections(validation, {}) if section.items]
     stages.sort(key=lambda section: section.name in _CHECKS)
-    verdict = Text(f"{sentence(validation)}.")
+    verdict = Text(" ".join(sentences(validation)))
     append_section(path, Section("validation", title, (verdict,), tuple(stages)))
 
 
@@ -71,7 +71,7 @@ def write_junit(validation: Validation, path: Path) -> None:
     required = _suite(root, "required", validation)
     for requirement in validation.unmet:
         case = _case(required, str(requirement), validation)
-        Xml.SubElement(case, "failure", message=_clean(sentence(validation)))
+        Xml.SubElement(case, "failure", message=_clean(" ".join(sentences(validation))))
     for suite in root:
         suite.set("tests", str(len(suite)))
         for kind in ("failure", "skipped"):

@@ -1,6 +1,7 @@
 """The verdict of a validation, as data and as a sentence.
 
-The figures are data (:class:`Validation`); :func:`sentence` is the one place that words them.
+The figures are data (:class:`Validation`); :func:`sentence` is the one place that words them. Their
+intervals stand in tables.
 """
 
 from __future__ import annotations
@@ -15,9 +16,9 @@ from cembench.core.wording import counted
 from cembench.results.comparison import Comparison
 from cembench.results.records import Printable
 from cembench.validation.finding import Stage, ValidationFinding
-from cembench.validation.quality import BaselineComparison, PairedComparison
+from cembench.validation.quality import BaselineComparison
 from cembench.validation.scaling import GrowthAnswer, GrowthComparison
-from cembench.validation.sizes import is_higher_at_last, looked_at_words, ratios_by_size
+from cembench.validation.sizes import is_higher_at_last, looked_at_sentence
 from cembench.validation.solver import CheckedMap
 
 STAGES: tuple[Stage, ...] = get_args(Stage)
@@ -90,8 +91,14 @@ def unmet(asked: Sequence[Requirement], validation: Validation) -> tuple[Require
     return tuple(r for r in dict.fromkeys(asked) if not _meets(r, validation))
 
 
+def sentences(validation: Validation) -> tuple[str, ...]:
+    """Return the verdict as sentences: what was found, and on which sizes."""
+    seen = (looked_at_sentence(validation.looked_at),) if validation.looked_at else ()
+    return (f"{sentence(validation)}.", *seen)
+
+
 def sentence(validation: Validation) -> str:
-    """Return the verdict as a sentence."""
+    """Return what was found, without a full stop."""
     if not validation.valid:
         return _invalid(validation.faults)
     parts = ["valid" if validation.conformal else "valid; not conformal, which it does not promise"]
@@ -103,15 +110,12 @@ def sentence(validation: Validation) -> str:
             if against.solve_time:
                 text += f", in the solve time of the external program ({against.solve_time})"
             parts.append(text)
-    parts += map(ratios_by_size, validation.at_sizes)
     if validation.growth is not None and validation.growth.answer is GrowthAnswer.inconclusive:
         parts.append("the growth of its seconds is inconclusive")
     if validation.folds_on:
         parts.append(f"folds on {_surfaces(validation.folds_on)}")
     if validation.no_map_on:
         parts.append(f"no map of {_surfaces(tuple(validation.no_map_on))}")
-    if validation.looked_at:
-        parts.append(looked_at_words(validation.looked_at))
     if validation.unmet:
         parts.append(f"required and not met: {', '.join(validation.unmet)}")
     return "; ".join(parts)
@@ -148,34 +152,23 @@ def _energy_words(against: BaselineComparison) -> str:
         side = "higher" if compared.lower >= compared.higher else "lower"
         text += f", equal within 1 % on {compared.equal}"
         text += f", {side} on {other}" if other else ""
-    return f"{text} ({_ratio_words(compared)})"
+    return f"{text} (median ratio {compared.ratio:.2f})"
 
 
-def _ratio_words(compared: PairedComparison) -> str:
-    text = f"median ratio {compared.ratio:.2f}"
-    if compared.interval is not None:
-        return f"{text}, 95 % interval {compared.interval.low:.2f}-{compared.interval.high:.2f}"
-    return f"{text}, too few surfaces for an interval"
-
-
-def _times(ratio: float, low: float, high: float, unit: str) -> str:
-    """Return factors with one decimal digit, or two if one would print 1.0."""
-    digits = 1 if ratio >= 1.15 else 2
-    return f"{ratio:.{digits}f} times {unit} ({low:.{digits}f}-{high:.{digits}f})"
+def _times(ratio: float, unit: str) -> str:
+    """Return a factor with one decimal digit, or two if one would print 1.0."""
+    return f"{ratio:.{1 if ratio >= 1.15 else 2}f} times {unit}"
 
 
 def _speed_words(speed: Comparison, title: str, *, named: bool) -> str:
-    than, interval = f" than {title}" if named else "", speed.interval
-    if interval is None:
+    than = f" than {title}" if named else ""
+    if speed.interval is None:
         return f"{speed.ratio:.2f} times {title}'s seconds, too few rounds for a verdict"
     if speed.verdict == "faster":
-        return _times(1 / speed.ratio, 1 / interval.high, 1 / interval.low, f"faster{than}")
+        return _times(1 / speed.ratio, f"faster{than}")
     if speed.verdict == "slower":
-        return _times(speed.ratio, interval.low, interval.high, f"slower{than}")
-    return (
-        f"neither faster nor slower than {title} for sure "
-        f"({interval.low:.2f}-{interval.high:.2f} times its seconds)"
-    )
+        return _times(speed.ratio, f"slower{than}")
+    return f"neither faster nor slower than {title} for sure"
 
 
 def _meets(requirement: Requirement, validation: Validation) -> bool:

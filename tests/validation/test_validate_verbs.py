@@ -79,9 +79,9 @@ def test_folds_and_refusals_are_told_and_what_is_required_gates(here):
     code, out, _ = here("folds-sometimes", *named, "--up-to", 0, *required, "--json")
     data = json.loads(out)
     assert data["verdict"].endswith(
-        "folds on 1 surface: flat-disk; no map of 1 surface: cone; looked at, in triangles: "
-        "contract 600 to 1,536, correctness 384 to 6,144, quality 600; "
-        "required and not met: no-folds, not-worse"
+        "folds on 1 surface: flat-disk; no map of 1 surface: cone; "
+        "required and not met: no-folds, not-worse. Looked at, in triangles: "
+        "contract 600 to 1,536, correctness 384 to 6,144, quality 600."
     )
     assert data["no_map_on"] == {"cone": "no cones"}
     assert (data["valid"], data["passed"], code) == (True, False, 1)

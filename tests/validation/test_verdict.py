@@ -45,8 +45,8 @@ def validation(**parts):
 
 def test_a_reviewer_can_read_it_aloud():
     assert sentence(validation(against=(against(),), folds_on=("hand",))) == (
-        "valid; E_C lower than CEM on 17 of 20 surfaces (median ratio 0.93, 95 % interval "
-        "0.90-0.96); 1.8 times faster (1.7-1.9); folds on 1 surface: hand"
+        "valid; E_C lower than CEM on 17 of 20 surfaces (median ratio 0.93); 1.8 times faster; "
+        "folds on 1 surface: hand"
     )
 
 
@@ -54,21 +54,20 @@ def test_worse_slower_and_without_a_map():
     worse = against(energy=(1, 1, 2, 1.2, None, None), speed=(1.52, 1.41, 1.7, "slower"))
     assert sentence(validation(against=(worse,), no_map_on={"maze": "no"})) == (
         "valid; E_C higher than CEM on 2 of 4 surfaces, equal within 1 % on 1, lower on 1 (median "
-        "ratio 1.20, too few surfaces for an interval); 1.5 times slower (1.4-1.7); no map of 1 "
-        "surface: maze"
+        "ratio 1.20); 1.5 times slower; no map of 1 surface: maze"
     )
 
 
 def test_a_small_gain_is_not_called_one_point_zero():
     quick = against(speed=(0.978, 0.93, 0.998, "faster"))
-    assert "1.02 times faster (1.00-1.08)" in sentence(validation(against=(quick,)))
+    assert "1.02 times faster" in sentence(validation(against=(quick,)))
 
 
 def test_equal_and_undecided():
     same = against(energy=(0, 6, 0, 1.0, 0.998, 1.001), speed=(1.01, 0.97, 1.05, "undecided"))
     assert sentence(validation(against=(same,))) == (
-        "valid; E_C equal to CEM's within 1 % on all 6 surfaces (median ratio 1.00, 95 % interval "
-        "1.00-1.00); neither faster nor slower than CEM for sure (0.97-1.05 times its seconds)"
+        "valid; E_C equal to CEM's within 1 % on all 6 surfaces (median ratio 1.00); neither "
+        "faster nor slower than CEM for sure"
     )
 
 
@@ -82,7 +81,7 @@ def test_several_baselines_are_named():
     said = sentence(
         validation(against=(against(), against("FDM", speed=(2, None, None, "too few rounds"))))
     )
-    assert "1.8 times faster than CEM (1.7-1.9)" in said
+    assert "1.8 times faster than CEM" in said
     assert "2.00 times FDM's seconds, too few rounds for a verdict" in said
 
 
