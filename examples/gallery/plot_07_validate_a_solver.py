@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 import cembench
-from cembench.validation.verdict import sentence
+from cembench.validation.verdict import sentences
 
 # %%
 # The solver is ``examples/stop_at_angles.py`` of the repository; this program lies in
@@ -26,7 +26,7 @@ found = cembench.validate(solver, surfaces=[small], checks_only=True)
 # %%
 # The verdict, and what it is made of.
 
-print(sentence(found))
+print(*sentences(found))
 for finding in found.findings:
     print(f"{'ok' if finding.ok else 'NO':3} {finding.stage:12} {finding.name}: {finding.measured}")
 
