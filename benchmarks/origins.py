@@ -26,7 +26,12 @@ FILE = ROOT / "reports/origins.json"
 #: Texts of files by their paths from the root of the repository.
 Tree = Mapping[str, str]
 #: Where the packages that lie below ``cembench`` once installed are in the repository.
-ELSEWHERE = {"algorithms": "algorithms", "papers": "papers", "surfaces": "meshes_gen"}
+ELSEWHERE = {
+    "algorithms": "algorithms",
+    "papers": "papers",
+    "surfaces": "meshes_gen",
+    "sharing": "sharing",
+}
 #: Which code is named as what: the first that fits. Other code has no part in figures.
 GROUPS = {
     "metrics": ("cembench/conformal/metrics.py", "cembench/conformal/atlas.py"),

@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import pandas as pd
+from cembench.sharing.leaderboard import UNSEEN
 
 from benchmarks.pages import ROOT, Section, Table
-from cembench.report.leaderboard import UNSEEN
 from cembench.results.columns import LIBRARY_MARK, PROGRAM_MARK
 from cembench.results.report_records import text_rows
 

@@ -30,7 +30,7 @@ def __getattr__(name: str) -> Any:
         from cembench.core.version import installed_version
 
         return installed_version()
-    place = _PLACE_OF.get(name) or _of_papers().get(name)
+    place = _PLACE_OF.get(name) or _brought().get(name)
     if place is None:
         module = sys.modules[__name__]  # by which Python suggests what was meant
         raise AttributeError(f"module 'cembench' has no attribute {name!r}", name=name, obj=module)
@@ -40,12 +40,12 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, *_of_papers()})
+    return sorted({*globals(), *__all__, *_brought()})
 
 
-def _of_papers() -> dict[str, str]:
-    """Return the modules of the names that papers bring with their verbs."""
+def _brought() -> dict[str, str]:
+    """Return the modules of the names that come with verbs, by entry points."""
     from importlib.metadata import entry_points
 
-    places = [entry.value for entry in entry_points(group="cembench.verbs")]
+    places = [entry.module for entry in entry_points(group="cembench.verbs")]
     return {name: place for place in places for name in importlib.import_module(place).__all__}

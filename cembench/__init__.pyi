@@ -21,8 +21,6 @@ from cembench.api.repair import Repair as Repair
 from cembench.api.repair import repair as repair
 from cembench.api.reproduce import Reproduction as Reproduction
 from cembench.api.reproduce import reproduce as reproduce
-from cembench.api.submissions import check_submissions as check_submissions
-from cembench.api.submissions import submit as submit
 from cembench.api.terrain import terrain as terrain
 from cembench.api.validate import validate as validate
 from cembench.core.errors import AlgorithmFailed as AlgorithmFailed
@@ -46,9 +44,8 @@ from cembench.mesh.triangle_mesh import TriangleMesh as TriangleMesh
 from cembench.registry import algorithm as algorithm
 from cembench.registry import external_program as external_program
 from cembench.registry import surface_family as surface_family
-from cembench.results.bundle import Submission as Submission
 from cembench.running.surfaces import load_surface as load_surface
 
 __version__: str
 
-def __getattr__(name: str) -> Any: ...  # what papers bring with their verbs
+def __getattr__(name: str) -> Any: ...  # what the entry points of `cembench.verbs` bring

@@ -38,7 +38,7 @@ LONG = (
     "mesh/test_unpacking.py",
     "algorithms/test_published.py",
     "report/test_html_browser.py",
-    "submissions/test_results_repository.py",
+    "sharing/test_results_repository.py",
 )
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).parents[1]
-PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen", "papers")
+PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen", "papers", "sharing")
 #: Functions that may write directly, and why.
 ALLOWED = {
     "benchmarks/kept_run.py": "a copy that is made again when it was cut off",

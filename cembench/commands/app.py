@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Annotated
@@ -29,14 +29,9 @@ MODULES = {
     "run": {
         verb: f"commands.run:{verb}" for verb in ("status", "show", "compare", "merge", "export")
     },
-    "submit": {
-        "submit": "api.submissions:submit",
-        **{verb: f"commands.submit:{verb}" for verb in ("submissions", "publish", "sign")},
-    },
     "paper": {"paper": "commands.paper:paper"},
     "validate": {"validate": "api.validate:validate"},
     "peers": {"peers": "commands.peers:peers"},
-    "exhibits": {},  # those of papers
     "fetch": {"fetch": "api.fetch:fetch"},
     "repair": {"repair": "api.repair:repair"},
     "cut": {"cut": "api.cut:cut"},
@@ -81,27 +76,32 @@ def load(word: str = "") -> None:
         for verb, described in descriptions().items():
             app.command(verb, help=described)(_global_options)
         return
-    chosen = [module for module, verbs in MODULES.items() if word in verbs]
-    for module in chosen or MODULES:
+    own = [module for module, verbs in MODULES.items() if word in verbs]
+    others = [entry for entry in brought() if entry.name == word]
+    if not own and not others:
+        own, others = [*MODULES], brought()
+    for module in own:
         import_module(f"cembench.commands.{module}")
+    for entry in others:
+        from cembench.commands.exhibits import add
+
+        add(entry)
+
+
+def brought() -> list[EntryPoint]:
+    """Return the verbs that come by entry points, sorted by their names."""
+    return sorted(entry_points(group="cembench.verbs"), key=lambda entry: entry.name)
 
 
 def descriptions() -> dict[str, str]:
     """Return the first sentence of each command's help, read without importing its module."""
-    lines: dict[str, str] = {}
-    for module, verbs in MODULES.items():
-        of_papers = entry_points(group="cembench.verbs") if module == "exhibits" else ()
-        lines |= {verb: _first_line(f"cembench.{where}") for verb, where in verbs.items()}
-        lines |= {
-            entry.name: _first_line(f"{entry.value}:{entry.name}")
-            for entry in sorted(of_papers, key=lambda entry: entry.name)
-        }
-    return lines
+    own = {v: f"cembench.{where}" for verbs in MODULES.values() for v, where in verbs.items()}
+    others = {entry.name: f"{entry.module}:{entry.attr or entry.name}" for entry in brought()}
+    return {verb: _first_line(*where.split(":")) for verb, where in (own | others).items()}
 
 
-def _first_line(function: str) -> str:
-    """Return the first paragraph of the docstring of ``module:name``."""
-    module, _, name = function.partition(":")
+def _first_line(module: str, name: str) -> str:
+    """Return the first paragraph of a function's docstring."""
     spec = find_spec(module)
     file = None if spec is None or spec.origin is None else Path(spec.origin)
     source = "" if file is None else file.read_text(encoding="utf-8")

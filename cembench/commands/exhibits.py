@@ -1,15 +1,17 @@
-"""Commands that papers bring: each makes exhibits of surfaces and adds them to a run.
+"""Commands that come by entry points: those of papers add exhibits of surfaces to a run.
 
 An entry point of the group ``cembench.verbs`` names a module. What its ``__all__`` names is part of
 the Python API; the function of the entry point's name becomes a command. ``loaded`` reads a
 surface; ``shown``, ``facts`` and ``failures`` are what is printed of a list of results, the same as
-plain data, and what went wrong. A module with a function ``add_command`` adds a command of its own.
+plain data, and what went wrong. A module with a function ``add_command`` adds commands of its own;
+its entry point names the function that describes the command, if that has another name.
 """
 
 from __future__ import annotations
 
 import inspect
-from importlib.metadata import EntryPoint, entry_points
+from importlib import import_module
+from importlib.metadata import EntryPoint
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -25,9 +27,9 @@ Surfaces = Annotated[
 ]
 
 
-def _add(entry: EntryPoint) -> None:
+def add(entry: EntryPoint) -> None:
     """Add the command of an entry point."""
-    verb, module = entry.name, entry.load()
+    verb, module = entry.name, import_module(entry.module)
     if hasattr(module, "add_command"):
         module.add_command()
         return
@@ -66,7 +68,3 @@ def _add(entry: EntryPoint) -> None:
             folder = (run / exhibits.FOLDER).resolve()
             out.print(f"\nExhibits: {folder}", soft_wrap=True, markup=False)
         fail(module.failures(made))
-
-
-for entry in sorted(entry_points(group="cembench.verbs"), key=lambda entry: entry.name):
-    _add(entry)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from cembench.commands.app import app
-from cembench.commands.console import Json, fail, note, out, print_json, print_pair, warn
+from cembench.commands.console import SHOWN, Json, fail, note, out, print_json, print_pair, warn
 from cembench.commands.options import DEFAULT_RUN, RequireSigned, Run, Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.overwriting import refuse_inputs
@@ -280,16 +280,16 @@ def merge(
     """
     from dataclasses import asdict
 
-    from cembench.commands.submit import check_signed
     from cembench.results.machines import machine_of
     from cembench.results.merging import merge as merged
+    from cembench.results.signing import signers_of
     from cembench.results.store import Store
     from cembench.results.verify import Depth, sound_records
 
     if output.exists() and all(run.exists() and run.samefile(output) for run in runs):
         raise ParameterError(f"{output} is the only run: name another one to merge into it.")
     refuse_inputs(output, runs, force=force)
-    check_signed(runs, require_signed)
+    signers_of(runs, require_signed, SHOWN)
     into = Store(output)
     depth = Depth.everything if verify else Depth.sample
     for run in runs:

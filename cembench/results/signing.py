@@ -18,6 +18,7 @@ from pathlib import Path
 from cembench.core.atomic import is_draft, write_bytes
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.loading import check_no_link, is_there, open_file, read_bytes
+from cembench.core.reporter import SILENT, Reporter
 from cembench.results.run_folder import METADATA, PLAN, SIGNATURE
 from cembench.results.store import Store
 
@@ -27,23 +28,7 @@ _SIGNED = ("records", "maps", "meshes", "environments", "exhibits", "others")
 
 
 def sign(run: Path, key: Path) -> Path:
-    """Sign a run; return the file of the signature.
-
-    Parameters
-    ----------
-    run : Path
-        The run's folder.
-    key : Path
-        A private SSH key, or a public one whose private key an agent holds.
-
-    Raises
-    ------
-    RecordError
-        The folder holds no run, or a file in it cannot be read.
-    ParameterError
-        OpenSSH is not installed, or refuses the key.
-
-    """
+    """Sign a run with a key, or one that an agent holds; return the file of the signature."""
     write_bytes(run / SIGNATURE, _signature(_contents(run), key))
     return run / SIGNATURE
 
@@ -111,6 +96,16 @@ def signer(run: Path, allowed: Path, bundle: str = "") -> str:
             "Get it anew, or have it signed again."
         )
     return name
+
+
+def signers_of(
+    runs: Iterable[Path], allowed: Path | None, reporter: Reporter = SILENT
+) -> dict[Path, str]:
+    """Return who signed each run, as :func:`signer`; without `allowed`, nothing is known."""
+    names = {} if allowed is None else {run: signer(run, allowed) for run in runs}
+    for run, name in names.items():
+        reporter.info(f"{run}: signed by {name}")
+    return names
 
 
 def _contents(run: Path) -> bytes:

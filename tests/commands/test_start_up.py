@@ -3,14 +3,13 @@
 import inspect
 import subprocess
 import sys
-from importlib.metadata import entry_points
 from itertools import chain
 
 import pytest
 
 import cembench
 from cembench.commands import cli
-from cembench.commands.app import MODULES, descriptions
+from cembench.commands.app import MODULES, brought, descriptions
 
 #: Each takes a tenth of a second to load, or more.
 SLOW = ("numpy", "scipy", "pydantic", "matplotlib", "igl", "shapely", "cvxopt", "PIL")
@@ -55,8 +54,8 @@ def test_a_command_line_loads_the_module_of_its_command():
 
 def test_the_modules_name_all_commands():
     known = [one.name or one.callback.__name__ for one in cli.app.registered_commands]
-    of_papers = [entry.name for entry in entry_points(group="cembench.verbs")]
-    assert sorted(known) == sorted([*chain.from_iterable(MODULES.values()), *of_papers])
+    others = [entry.name for entry in brought()]
+    assert sorted(known) == sorted([*chain.from_iterable(MODULES.values()), *others])
 
 
 def test_the_help_describes_the_commands_in_their_own_words():

@@ -3,12 +3,12 @@
 import re
 
 import pytest
+from cembench.sharing import site
+from cembench.sharing.site import about, history, write_site
 
 from cembench.core.errors import ParameterError, RecordError
-from cembench.report import site
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Report
-from cembench.report.site import about, history, publish
 from tests.results.test_machines import cell_of, run_of
 
 
@@ -43,9 +43,9 @@ def test_ratios_are_never_formed_over_two_machines(tmp_path):
 
 def test_what_cannot_be_published_is_said(tmp_path):
     with pytest.raises(ParameterError, match="each run once"):
-        publish([tmp_path, tmp_path / "."], tmp_path / "site")
+        write_site([tmp_path, tmp_path / "."], tmp_path / "site")
     with pytest.raises(RecordError, match="holds no run"):
-        publish([tmp_path / "nowhere"], tmp_path / "site")
+        write_site([tmp_path / "nowhere"], tmp_path / "site")
     assert not (tmp_path / "site").exists()
 
 
@@ -60,7 +60,7 @@ def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, 
     for number in (1, 2):
         published(tmp_path, number, 4.0, "hat")
     runs = [tmp_path / "run-2", tmp_path / "run-1"]
-    result = publish(runs, tmp_path / "site")
+    result = write_site(runs, tmp_path / "site")
     assert shown == ["run-2", "run-1"]
     assert [run.name for run in result] == ["run-1", "run-2"]
     page = (tmp_path / "site/index.html").read_text()
@@ -69,6 +69,6 @@ def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, 
     assert pages | {"figures/history.svg"} == set(links)
     assert all((tmp_path / "site" / link).is_file() for link in links)
     assert "://" not in page
-    publish(runs[:1], tmp_path / "site")
+    write_site(runs[:1], tmp_path / "site")
     kept = [path for path in (tmp_path / "site/runs").rglob("*") if path.is_file()]
     assert kept == [tmp_path / "site/runs/run-2/index.html"]

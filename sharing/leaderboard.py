@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant, difference
 from cembench.report.content.standings import title_of
-from cembench.report.declarations import filled, own, parsed
+from cembench.report.declarations import filled, parsed, read
 from cembench.report.declared import DeclaredTable, aggregate
 from cembench.report.document import (
     Column,
@@ -123,7 +123,8 @@ def _over_best(rows: pd.DataFrame) -> pd.DataFrame:
 
 def _ranked(target: str, maps: pd.DataFrame) -> Table:
     """Return the algorithms of a target, the smallest angle errors first."""
-    spec = parsed(own("leaderboard.toml"), DeclaredTable, "leaderboard.toml")["ranked"]
+    declared = Path(__file__).with_suffix(".toml")
+    spec = parsed(read(declared), DeclaredTable, declared.name)["ranked"]
     columns = (Column("algorithm", numeric=False), *(one.heading for one in spec.columns))
     rows = [
         (words(str(label)), *(aggregate(one, group) for one in spec.columns))

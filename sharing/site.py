@@ -27,12 +27,13 @@ from cembench.core.names import distinct_slugs
 from cembench.core.version import installed_version
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
-from cembench.report.leaderboard import Entrant, leaderboard
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
 from cembench.report.render.html import render
 from cembench.results.machines import machine_of, machine_of_record, software_differences
 from cembench.results.records import REFERENCE
+
+from .leaderboard import Entrant, leaderboard
 
 #: Called with the run's name, the number done and the total.
 Progress = Callable[[str, int, int], None]
@@ -71,7 +72,7 @@ class HeadlineRatio:
         return f"{self.ratio:.2f} ({self.surfaces}{'' if self.common else '*'})"
 
 
-def publish(
+def write_site(
     runs: Sequence[Path],
     folder: Path,
     progress: Progress = lambda *_: None,
@@ -206,16 +207,17 @@ def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None
 
 
 def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
-    from cembench.report.render.html import environment, template_text
+    from cembench.report.render.html import environment
 
+    here = Path(__file__).parent
     ratios = history(runs)
     if len(runs) > 1 and ratios:
         write_plot(_plot(runs, ratios), draft)
     about = {"runs": runs, "history": ratios, "reference": REFERENCE}
-    page = environment().get_template("site.html")
+    page = environment().from_string((here / "site.html").read_text(encoding="utf-8"))
     text = page.render(
         about,
-        style=template_text("site.css"),
+        style=(here / "site.css").read_text(encoding="utf-8"),
         drawn=len(runs) > 1 and bool(ratios),
         starred=any(one and not one.common for row in ratios.values() for one in row),
         version=installed_version(),

@@ -9,7 +9,7 @@ import pytest
 import yaml
 from markdown_it import MarkdownIt
 
-from tests.submissions.workflow_steps import run_step, steps_of
+from tests.sharing.workflow_steps import run_step, steps_of
 
 ROOT = Path(__file__).parents[2]
 ACTION = ROOT / "action.yml"

@@ -22,7 +22,7 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from statistics import median
@@ -39,6 +39,8 @@ from cembench.results.run_folder import METADATA, SIGNATURE
 from cembench.results.signing import signature_of, signer
 from cembench.results.store import Store
 from cembench.results.verify import Depth, verify
+
+from .submissions import Submission
 
 #: How the file of a bundle ends.
 SUFFIX = ".zip"
@@ -66,50 +68,6 @@ LEAST = 1 / 200
 APART, OTHERS = 10.0, 3
 #: What rounding and the clocks may add.
 _SLACK = 1.05
-
-
-@dataclass(frozen=True)
-class Submission:
-    """A bundle that was checked.
-
-    Parameters
-    ----------
-    name : str
-        Its file's name without the suffix.
-    faults : tuple of str
-        Why it is refused; empty if it is accepted.
-    cells : int
-        The number of its records.
-    machines : tuple of str
-        The machines, as they named themselves.
-    maps : int
-        The number of maps whose figures were computed again.
-    signer : str
-        Who signed it, if that was asked for.
-    unlicensed : tuple of str
-        Surfaces that were left out when it was packed, with no licence stated: nobody can compute
-        the figures of their maps again.
-
-    Examples
-    --------
-    >>> from cembench import Submission
-    >>> Submission("mine", faults=("it holds no record",)).accepted
-    False
-
-    """
-
-    name: str
-    faults: tuple[str, ...] = ()
-    cells: int = 0
-    machines: tuple[str, ...] = ()
-    maps: int = 0
-    signer: str = ""
-    unlicensed: tuple[str, ...] = ()
-
-    @property
-    def accepted(self) -> bool:
-        """Whether there is no fault."""
-        return not self.faults
 
 
 def pack(

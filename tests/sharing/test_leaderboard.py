@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
+from cembench.sharing.leaderboard import Entrant, leaderboard
+
 from cembench.report.document import Table, items_of
-from cembench.report.leaderboard import Entrant, leaderboard
 from tests.report.conftest import drawing_little
 
 

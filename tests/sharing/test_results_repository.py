@@ -9,19 +9,18 @@ import zipfile
 from pathlib import Path
 
 import pytest
+from cembench.sharing import bundle, site
+from cembench.sharing.leaderboard import leaderboard
 
 import cembench
 from cembench.core.errors import ParameterError, RecordError
-from cembench.report import site
 from cembench.report.document import Report
-from cembench.report.leaderboard import leaderboard
-from cembench.results import bundle
 from cembench.results.records import signed
 from cembench.results.signing import signer
 from tests.browser import open_browser
 from tests.records import changed
 from tests.results.simulated_machines import SECONDS, SURFACES, machine_run
-from tests.submissions.workflow_steps import run_step, steps_of
+from tests.sharing.workflow_steps import run_step, steps_of
 
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples/results_repository"
@@ -148,7 +147,7 @@ def published(bundles, tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(site, "build_report", lambda e, f, command: Report(command, command, (), ()))
         with bundle.accepted(bundle.bundles_in(bundles)) as runs:
-            site.publish(runs, folder)
+            site.write_site(runs, folder)
             entrants = [site.Entrant(run.name, site.Evidence.of(run)) for run in runs]
             return folder, leaderboard(entrants, "cembench publish")
 

@@ -1,0 +1,1 @@
+"""Runs that are sent to others, collected and published: bundles, their checks, a site."""
