@@ -132,15 +132,15 @@ def _ranked(target: str, maps: pd.DataFrame) -> Table:
     ]
     rows.sort(key=lambda row: (row[1].number or inf, row[0].text))
     known = {"target": title_of(target), "surfaces": maps["mesh_hash"].nunique()}
-    title, caption = filled(spec.title, known), filled(spec.caption, known)
-    return Table(f"ranked-{slug(target)}", title, columns, tuple(rows), caption)
+    title, note = filled(spec.title, known), filled(spec.caption, known)
+    return Table(f"ranked-{slug(target)}", title, columns, tuple(rows), notes=(note,))
 
 
 def _leader_words(ranked: Sequence[Table]) -> tuple[str]:
-    """Return who leads for each target, in words."""
+    """Return who leads for each target on average, in words; intervals are in the tables."""
     parts = [
-        f"{table.title.partition(',')[0]}: {table.rows[0][0].text} has the smallest angle errors "
-        f"of {len(table.rows)} algorithms."
+        f"{table.title.partition(',')[0]}: on average {table.rows[0][0].text} has the smallest "
+        f"angle errors of {len(table.rows)} algorithms."
         for table in ranked
         if len(table.rows) > 1
     ]

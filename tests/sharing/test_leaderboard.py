@@ -55,7 +55,7 @@ def test_it_opens_with_a_ranked_table_for_each_target_and_a_plot(evidence, tmp_p
     assert all(row[1].record for row in disk.rows)
     assert report.findings.plot.name == "leaders"
     assert (tmp_path / report.findings.plot.files[0]).is_file()
-    assert "Maps with a free boundary: LSCM has the smallest" in report.findings.sentences[0][0]
+    assert "a free boundary: on average LSCM has the smallest" in report.findings.sentences[0][0]
     for table in (disk, free):
         place = [column.group for column in table.columns].index("at equal angles")
         fastest = [row[place] for row in table.rows if row[place].number == 1]
