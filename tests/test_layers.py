@@ -68,7 +68,7 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 2_170,
-    "mesh": 7_230,
+    "mesh": 7_070,
     "linear_algebra": 1_540,
     "conformal": 6_780,
     "registry": 970,
