@@ -12,6 +12,7 @@ from importlib.metadata import PackageNotFoundError
 from importlib.metadata import version as version_of
 from pathlib import Path
 
+from cembench.core.loading import sha256_of
 from cembench.core.program import Library, Program
 from cembench.registry import Algorithm
 from cembench.results.records import External
@@ -65,8 +66,7 @@ def library_version(library: Library) -> str | None:
 @lru_cache(maxsize=64)
 def _digest(path: Path, size: int, changed: int) -> str:
     """Return a file's SHA-256, cached because programs may have hundreds of megabytes."""
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()
+    return sha256_of(path)
 
 
 def program_sources(program: Program) -> dict[str, str]:
