@@ -15,7 +15,7 @@ from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 
 
@@ -119,16 +119,12 @@ class Angles:
                 np.einsum("trc,tc->tr", J, moved) - to_triangle * (free / total)[:, None]
             )
         try:
-            if self._cholesky is None:
-                self._cholesky = Cholesky(self._A)
-            else:
-                self._cholesky.update(self._A)
+            self._cholesky = factor_like(self._cholesky, self._A)
         except NotPositiveDefinite as error:
             thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
             raise AlgorithmFailed(
-                f"the angle constraints are linearly dependent in double precision ({error}): "
-                "the sharpest "
-                f"angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
+                f"the angle constraints are linearly dependent in double precision ({error}): the "
+                f"sharpest angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
             ) from None
         y = self._cholesky.solve(b)
         with phase("assembly"):

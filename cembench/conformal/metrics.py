@@ -380,8 +380,6 @@ class Metric:
         does not apply to such a map.
     better : "lower" or None
         Which of two values is better; None if neither is by itself.
-    gauge_invariant : bool
-        Whether a Moebius map of the image leaves it unchanged, up to the discretisation.
     shown : {"overview", "page", "record"}
         The shortest kind of table with a column for it: a run's overview, a surface's page, or only
         the listing of a single record.
@@ -397,7 +395,6 @@ class Metric:
     meaning: str
     compute: Callable[[MapFigures], float | int | None]
     better: Literal["lower"] | None = "lower"
-    gauge_invariant: bool = True
     shown: Literal["overview", "page", "record"] = "record"
 
     def text(self, value: float | None, *, precise: bool = False) -> str:
@@ -411,7 +408,7 @@ METRICS: tuple[Metric, ...] = (
     Metric(
         "conformal_energy", "conformal energy", "E_C", "", ".4f", ".6f",
         "E_C = E_D - A (Eq. 7); 0 for a conformal map",
-        lambda f: f.energy - f.area, gauge_invariant=False, shown="overview",
+        lambda f: f.energy - f.area, shown="overview",
     ),
     Metric(
         "angle_error_mean_deg", "mean angle error", "angle°", "degrees", ".2f", ".4f",
@@ -441,12 +438,12 @@ METRICS: tuple[Metric, ...] = (
     Metric(
         "dirichlet_energy", "Dirichlet energy", "E_D", "", ".4f", ".6f",
         "E_D (Eq. 5), with the cotangent weights of the surface",
-        lambda f: f.energy, gauge_invariant=False,
+        lambda f: f.energy,
     ),
     Metric(
         "image_area", "image area", "A", "", ".4f", ".6f",
         "A (Eq. 8), the area that the image of the boundary encloses",
-        lambda f: f.area, better=None, gauge_invariant=False,
+        lambda f: f.area, better=None,
     ),
     Metric(
         "boundary_circularity", "circularity error", "circularity", "of the radius", ".0e", ".1e",
@@ -488,13 +485,12 @@ METRICS: tuple[Metric, ...] = (
         "texel_density_ratio", "texel density", "texels", ": 1", ".3g", ".4g",
         "largest over smallest texels per length on the surface, but for a hundredth of it at "
         "either end",
-        lambda f: texel_density_ratio(f.areas, f.image_areas), gauge_invariant=False,
+        lambda f: texel_density_ratio(f.areas, f.image_areas),
     ),
     Metric(
         "undersampled_share", "undersampled", "undersampled", "of the surface", ".1e", ".2g",
         f"share of the surface with less than 1 texel for each ten-thousandth, at {SIDE:,} px",
         lambda f: undersampled_share(f.areas, f.image_areas, extent_of(f.uv)),
-        gauge_invariant=False,
     ),
 )  # fmt: skip
 

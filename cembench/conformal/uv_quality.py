@@ -7,16 +7,16 @@ picture, and [u, u + 1] x [v, v + 1] the tile 1001 + u + 10 v.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from cembench.conformal.atlas import AtlasFigures, CutMap
-from cembench.conformal.metrics import MapFigures, Metric
+from cembench.conformal.metrics import METRICS, MapFigures, Metric
 from cembench.conformal.planar import layered_areas
-from cembench.conformal.texel_density import SIDE, undersampled_share
+from cembench.conformal.texel_density import undersampled_share
 from cembench.core.arrays import Complex, Indices, Real
 
 #: Number of worst places, and their least distance as a share of the surface's diagonal.
@@ -169,10 +169,9 @@ UV_METRICS: tuple[Metric, ...] = (
         "islands of which a part lies outside the tile of their centre",
         lambda f: _uv(f).beyond,
     ),
-    Metric(
-        "undersampled_share", "undersampled", "", "of the surface", ".1e", ".2g",
-        f"share of the surface with less than 1 texel for each ten-thousandth, at {SIDE:,} px",
-        lambda f: undersampled_share(f.areas, f.image_areas, 1.0),
+    replace(
+        next(metric for metric in METRICS if metric.name == "undersampled_share"),
+        compute=lambda f: undersampled_share(f.areas, f.image_areas, 1.0),
     ),
 )  # fmt: skip
 

@@ -10,7 +10,6 @@ in it does. A file that is already in the folder is recognised by its content, w
 
 from __future__ import annotations
 
-import hashlib
 import os
 import shutil
 import tempfile
@@ -29,6 +28,7 @@ from platformdirs import user_cache_dir
 from cembench.core.atomic import is_draft, write, write_bytes
 from cembench.core.errors import CembenchError, DatasetError, MeshError, RecordError
 from cembench.core.extras import Extra, require
+from cembench.core.loading import sha256_of
 from cembench.core.names import file_name
 from cembench.mesh.download import LARGEST, Bounds, DownloadError, Progress, download
 
@@ -151,7 +151,7 @@ def _is_whole(dataset: Dataset, path: Path) -> bool:
     if dataset.part and path == dataset.path:
         return dataset.part.is_whole(path)
     if dataset.sha256:
-        return _sha256(path) == dataset.sha256
+        return sha256_of(path) == dataset.sha256
     return not dataset.mesh_hash or _hash_of_mesh(dataset, path) == dataset.mesh_hash
 
 
@@ -273,7 +273,7 @@ def _holds(path: Path, dataset: Dataset) -> bool:
     try:
         if not path.is_file() or (dataset.size and path.stat().st_size != dataset.size):
             return False
-        return _sha256(path) == dataset.sha256
+        return sha256_of(path) == dataset.sha256
     except OSError:
         return False
 
@@ -375,8 +375,3 @@ def _check_whole(dataset: Dataset, path: Path) -> None:
         f"{dataset.file} from {dataset.url} is damaged or another file: its {what}. Try again, "
         f"or set {MIRROR_VARIABLE} to another mirror."
     )
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

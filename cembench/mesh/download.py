@@ -70,15 +70,8 @@ class Bounds:
     stop: threading.Event = field(default_factory=threading.Event)
 
 
-@dataclass(frozen=True)
-class _Answered:
-    """An answer has begun; its announced size in bytes, or 0."""
-
-    announced: int
-
-
-#: What the thread hands over: the beginning, the bytes, and the end or an error.
-_Message = _Answered | bytes | Exception | None
+#: What the thread hands over: the announced size in bytes or 0, the bytes, the end or an error.
+_Message = int | bytes | Exception | None
 
 
 def download(url: str, file: BinaryIO, bounds: Bounds, progress: Progress | None = None) -> None:
@@ -97,10 +90,10 @@ def download(url: str, file: BinaryIO, bounds: Bounds, progress: Progress | None
     try:
         arrived = 0
         for message in _messages(messages, bounds):
-            if isinstance(message, _Answered):
-                _check_size(message.announced, bounds.size)
+            if isinstance(message, int):
+                _check_size(message, bounds.size)
                 if progress is not None:
-                    progress.total = message.announced
+                    progress.total = message
                 continue
             arrived += len(message)
             _check_size(arrived, bounds.size)
@@ -120,7 +113,7 @@ def _check_size(size: int, most: int) -> None:
         )
 
 
-def _messages(messages: Queue[_Message], bounds: Bounds) -> Iterator[_Answered | bytes]:
+def _messages(messages: Queue[_Message], bounds: Bounds) -> Iterator[int | bytes]:
     """Yield what arrives, until the end."""
     begun, since, arrived = False, monotonic(), 0
     while True:
@@ -144,7 +137,7 @@ def _messages(messages: Queue[_Message], bounds: Bounds) -> Iterator[_Answered |
             return
         if isinstance(message, Exception):
             raise DownloadError(describe_error(message)) from message
-        if isinstance(message, _Answered):
+        if isinstance(message, int):
             begun, since = True, monotonic()
         else:
             arrived += len(message)
@@ -166,7 +159,7 @@ def _ask(url: str, timeout: float, messages: Queue[_Message], abandoned: threadi
     try:
         with closing(_answer(url, timeout)) as answer:
             answer.raise_for_status()
-            hand_over(_Answered(int(answer.headers.get("Content-Length", 0))))
+            hand_over(int(answer.headers.get("Content-Length", 0)))
             for chunk in answer.raw.stream(_CHUNK, decode_content=False):
                 if not hand_over(chunk):
                     return

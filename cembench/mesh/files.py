@@ -41,7 +41,7 @@ READERS: dict[str, Callable[..., Soup]] = {
     ".off": off.read,
     ".ply": ply.read,
     ".stl": stl.read,
-    ".mat": mat.read,
+    ".mat": apart(mat.read, Extra.FORMATS, "scipy"),
     ".npz": npz.read,
     ".vtk": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
     ".vtu": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
@@ -72,7 +72,7 @@ _NO_SURFACES = {
     (".gz", ".bz2", ".xz", ".zip", ".7z"): "it is compressed. Unpack it first",
 }
 #: Formats of named arrays.
-_OF_ARRAYS = {".mat": mat.read, ".npz": npz.read}
+_OF_ARRAYS = (".mat", ".npz")
 _WRITERS: dict[str, Callable[[Soup], bytes]] = {
     ".obj": obj.write,
     ".ply": ply.write,
@@ -142,9 +142,11 @@ def read_soup(
             raise MeshError(
                 f"arrays can be named only for {', '.join(_OF_ARRAYS)} files, not for {suffix}."
             )
-        more: dict[str, Any] = {"uv": True} if uv else {}
+        options: dict[str, Any] = {"arrays": arrays} if arrays else {}
+        if uv:
+            options["uv"] = True
         read = READERS.get(suffix) or _library_reader(suffix) or _read_freesurfer
-        soup = _OF_ARRAYS[suffix](path, arrays) if arrays else read(path, **more)
+        soup = read(path, **options)
         return (soup.subset(*polygons) if polygons else soup).named(path.stem)
     except MeshError as error:
         raise MeshError(f"{path}: {error}") from error.__cause__

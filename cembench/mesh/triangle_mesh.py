@@ -246,13 +246,7 @@ class DiskMesh(TriangleMesh):
     def _check_topology(
         cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
     ) -> tuple[Notice, ...]:
-        _refuse_closed(F, len(V), loops)
-        problems = _handles(F, len(V), loops)
-        if len(loops) > 1:
-            problems.insert(0, _holes(V, loops))
-        if problems:
-            raise UnusableMeshError(problems)
-        return definition_1_notices(F, len(V), loops)
+        return _check_planar(F, len(V), loops, [_holes(V, loops)] if len(loops) > 1 else [])
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -339,17 +333,12 @@ class HoledMesh(TriangleMesh):
     def _check_topology(
         cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
     ) -> tuple[Notice, ...]:
-        _refuse_closed(F, len(V), loops)
-        problems = _handles(F, len(V), loops)
-        if len(loops) == 1:
-            text = (
-                "the surface has a single boundary loop; this needs an outer boundary and at least "
-                "one hole"
-            )
-            problems.insert(0, Problem(Defect.no_hole, 1, text))
-        if problems:
-            raise UnusableMeshError(problems)
-        return definition_1_notices(F, len(V), loops)
+        text = (
+            "the surface has a single boundary loop; this needs an outer boundary and at least one "
+            "hole"
+        )
+        wrong = [Problem(Defect.no_hole, 1, text)] if len(loops) == 1 else []
+        return _check_planar(F, len(V), loops, wrong)
 
 
 def _when_repaired(
@@ -386,12 +375,17 @@ def _of_cut(problem: Problem) -> Problem:
     return replace(problem, text=f"once it is cut, {problem.text}", other_remedy=Remedy.cut)
 
 
-def _refuse_closed(F: NDArray[np.int64], n: int, loops: Loops) -> None:
-    """Raise :class:`UnusableMeshError` if a surface has no boundary loop."""
+def _check_planar(
+    F: NDArray[np.int64], n: int, loops: Loops, problems: list[Problem]
+) -> tuple[Notice, ...]:
+    """Raise if there are problems, no boundary loop, or handles; return notices for the user."""
     if not loops:
         text = "the surface is closed: it has no boundary loop, and a map to the disk needs one"
-        closed = Problem(Defect.closed, 1, text)
-        raise UnusableMeshError([closed, *_handles(F, n, loops)])
+        problems = [Problem(Defect.closed, 1, text)]
+    problems = [*problems, *_handles(F, n, loops)]
+    if problems:
+        raise UnusableMeshError(problems)
+    return definition_1_notices(F, n, loops)
 
 
 def _holes(V: NDArray[np.float64], loops: Loops) -> Problem:

@@ -14,8 +14,7 @@ import numpy as np
 
 from cembench.core.arrays import Complex, Indices, Points
 from cembench.core.errors import MeshError, describe_error
-from cembench.mesh.files import READ_WITH_UV, read_soup
-from cembench.mesh.formats import mat, npz, obj, off, ply
+from cembench.mesh.files import READ_WITH_UV, READERS, read_soup
 from cembench.mesh.soup import NO_UV, Soup, columns, complex_of, damaged, shown
 
 #: Allowed distance of a vertex from its original position, relative to the surface's extent: single
@@ -38,7 +37,7 @@ def read_uv(path: Path) -> Soup:
     """
     try:
         file = _READERS[path.suffix.lower()](path, uv=True)
-    except (OSError, ValueError, OverflowError, IndexError, KeyError) as error:
+    except (MemoryError, OSError, ValueError, OverflowError, IndexError, KeyError) as error:
         raise MeshError(f"{path.name} cannot be read: {describe_error(error)}") from error
     if file.uv is None or not len(file.uv):
         obj_words = (
@@ -249,11 +248,7 @@ def _read_text(path: Path, *, uv: bool) -> Soup:
 
 
 _READERS: dict[str, Callable[..., Soup]] = {
-    ".obj": obj.read,
-    ".off": off.read,
-    ".ply": ply.read,
-    ".mat": mat.read,
-    ".npz": npz.read,
+    **{suffix: READERS[suffix] for suffix in (".obj", ".off", ".ply", ".mat", ".npz")},
     ".txt": _read_text,
 }
 

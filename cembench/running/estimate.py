@@ -17,7 +17,7 @@ from cembench.results.power_law import PowerLaw, fit
 from cembench.results.records import Cell, Record
 from cembench.running.fork_server import can_fork
 from cembench.running.measure import LONG_CALL
-from cembench.running.usual_costs import FACES, ROUGH_BYTES_A_FACE, USUAL, USUAL_BYTES
+from cembench.running.usual_costs import FACES, ROUGH_BYTES_A_FACE, USUAL
 
 Basis = Literal["recorded", "other sizes", "rough"]
 
@@ -72,7 +72,7 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     memory = (
         max(_bytes_at(faces, size, peak) for size, peak in peaks)
         if peaks
-        else ROUGH_BYTES + USUAL_BYTES.get(cell.algorithm, ROUGH_BYTES_A_FACE) * faces
+        else _usual_bytes(cell.algorithm, faces)
     )
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
@@ -88,9 +88,14 @@ def expected_bytes(algorithm: str, faces: int) -> float | None:
 
     Below :data:`LARGE` triangles memory depends on more than their number, and is seldom short.
     """
-    if faces < LARGE or algorithm not in USUAL_BYTES:
+    if faces < LARGE or algorithm not in USUAL:
         return None
-    return ROUGH_BYTES + USUAL_BYTES[algorithm] * faces
+    return _usual_bytes(algorithm, faces)
+
+
+def _usual_bytes(algorithm: str, faces: int) -> float:
+    *_, a_face = USUAL.get(algorithm, (ROUGH_BYTES_A_FACE,))
+    return ROUGH_BYTES + a_face * faces
 
 
 def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:
@@ -115,6 +120,6 @@ def law_through(points: Sequence[tuple[float, float]]) -> PowerLaw:
 
 def _usual_law(cell: Cell) -> PowerLaw:
     """Return the power law of a built-in algorithm, or of the paper's slowest for others."""
-    laws = USUAL.get(cell.algorithm, USUAL[SLOWEST])
-    seconds, exponent = laws[cell.solves != "reuse"]
+    reused, anew, _ = USUAL.get(cell.algorithm, USUAL[SLOWEST])
+    seconds, exponent = reused if cell.solves == "reuse" else anew
     return PowerLaw(seconds / FACES**exponent, exponent)

@@ -14,10 +14,7 @@ from cembench.core.names import did_you_mean
 from cembench.core.wording import Setting
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.datasets import Dataset
-from cembench.mesh.files import (
-    READERS,
-    is_named_like_a_mesh,
-)
+from cembench.mesh.files import READERS, is_named_like_a_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.comparison import circumstances
@@ -203,11 +200,7 @@ def mesh_facts(mesh: TriangleMesh, standing: Provenance = Provenance()) -> MeshF
         boundary_vertices=sum(len(loop) for loop in mesh.loops),
         non_delaunay_share=non_delaunay_share(mesh),
         notices=mesh.notices,
-        paper_row=standing.paper_row,
-        origin=standing.origin,
-        source=standing.source,
-        family=standing.family,
-        fitted=standing.fitted,
+        **vars(standing),
     )
 
 

@@ -142,15 +142,7 @@ def load_libraries() -> None:
 
 def _check(job: Job) -> Answer:
     algorithm = load_algorithm(job.cell.algorithm, job.plugins)
-    outcome, uv = call_cell(algorithm, _mesh(job), job.cell)
-    if uv is not None:
-        np.save(job.uv_file, uv)
-    return Answer(outcome=outcome)
-
-
-def _again(job: Job) -> Answer:
-    algorithm = load_algorithm(job.cell.algorithm, job.plugins)
-    surface = moved(_mesh(job), job.motions[0])
+    surface = moved(_mesh(job), *job.motions) if job.motions else _mesh(job)
     cell = job.cell.model_copy(update={"mesh_hash": surface.hash})
     outcome, uv = call_cell(algorithm, surface, cell)
     if uv is not None:
@@ -213,7 +205,7 @@ def _judge_calls(job: Job) -> Answer:
 _TASKS: dict[str, Callable[[Job], Answer]] = {
     "check": _check,
     "time": _time,
-    "again": _again,
+    "again": _check,
     "judge check": _judge_check,
     "judge calls": _judge_calls,
 }

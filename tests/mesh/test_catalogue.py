@@ -178,7 +178,7 @@ def test_drafts_and_files_that_vanish_while_they_are_looked_at_are_no_obstacle(
     folder.mkdir()
     gone.write_bytes(content(0))
     draft.write_bytes(content(0))
-    read = wholeness._sha256
+    read = wholeness.sha256_of
 
     def vanishing(path):
         assert path != draft
@@ -186,7 +186,7 @@ def test_drafts_and_files_that_vanish_while_they_are_looked_at_are_no_obstacle(
             gone.unlink()
         return read(path)
 
-    monkeypatch.setattr(wholeness, "_sha256", vanishing)
+    monkeypatch.setattr(wholeness, "sha256_of", vanishing)
     assert fetch(wanted, have=[folder]).read_bytes() == content(0)
     assert not gone.exists()
     assert asked[wanted.file] == 1

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -20,7 +16,6 @@ from cembench.mesh import files
 from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.formats import apart
 from cembench.mesh.triangle_mesh import TriangleMesh
-from tests.forked import forked
 
 
 @pytest.fixture(scope="module")
@@ -165,21 +160,6 @@ def test_gifti(disk, tmp_path):
     nibabel.save(gifti.GiftiImage(darrays=arrays[:1]), tmp_path / "b.gii")
     with pytest.raises(MeshError, match=r"holds 1 sets of points and 0 of triangles"):
         read_mesh(tmp_path / "b.gii")
-
-
-@pytest.fixture
-def forked_readers(monkeypatch):
-    """Libraries read in forks of this process: twenty-five interpreters would load them anew."""
-
-    def run(command, check, timeout, **streams):
-        assert timeout > 60
-        assert set(streams.values()) == {subprocess.DEVNULL}
-        assert command[:4] == [sys.executable, "-P", "-m", apart.__name__]
-        with Path(os.devnull).open("r+b") as nowhere:
-            code = forked(lambda: apart._main(*command[4:]), [nowhere] * 3)
-        return subprocess.CompletedProcess(command, code)
-
-    monkeypatch.setattr(apart.subprocess, "run", run)
 
 
 @pytest.mark.usefixtures("forked_readers")

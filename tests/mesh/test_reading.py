@@ -340,6 +340,7 @@ def test_lines_that_are_not_obj_are_reported(text, tmp_path):
     assert notice.text.endswith(f"OBJ were ignored: 1, the first: line 6, {text.strip()!r}")
 
 
+@pytest.mark.usefixtures("forked_readers")
 def test_matlab_files_cut_anywhere_are_refused(tmp_path):
     for compressed in (False, True):
         savemat(
@@ -356,6 +357,14 @@ def test_matlab_files_cut_anywhere_are_refused(tmp_path):
                 continue
             assert soup.V.tolist() == POINTS.tolist()
             assert soup.corners.tolist() == np.ravel(TRIANGLES).tolist()
+
+
+def test_a_matlab_file_cut_within_a_variable_that_nobody_wants_is_refused(tmp_path):
+    arrays = {"v": POINTS, "f": np.array(TRIANGLES) + 1.0, "name": "text"}
+    savemat(tmp_path / "a.mat", arrays)
+    (tmp_path / "a.mat").write_bytes((tmp_path / "a.mat").read_bytes()[:-8])
+    with pytest.raises(MeshError, match="as MAT: it was cut short"):
+        read_soup(tmp_path / "a.mat")
 
 
 def test_matlab_files_of_version_4_are_refused_with_the_remedy(tmp_path):

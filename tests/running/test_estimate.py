@@ -8,7 +8,7 @@ from cembench.running.estimate import (
     expected_bytes,
     law_through,
 )
-from cembench.running.usual_costs import USUAL, USUAL_BYTES
+from cembench.running.usual_costs import USUAL
 from tests.records import changed, record_of
 
 
@@ -80,7 +80,6 @@ def test_before_anything_is_recorded_it_is_within_a_factor_of_two(
 def test_every_built_in_algorithm_has_its_usual_costs():
     own = [a.name for a in load_registry().algorithms.values() if a.origin == "cembench"]
     assert set(own) <= set(USUAL)
-    assert set(own) <= set(USUAL_BYTES)
 
 
 def test_memory_is_expected_of_large_surfaces_and_known_algorithms_only():

@@ -188,7 +188,7 @@ def test_an_algorithm_is_imported_before_its_process_knows_the_surface(tmp_path,
     monkeypatch.setattr(worker, "load_algorithm", lambda *_: called.append("algorithm"))
     monkeypatch.setattr(worker, "_mesh", stop)
     made = job.model_copy(update={"parts": (part,), "cell": part.cell})
-    for run in (worker._time, worker._check, worker._again):
+    for run in (worker._time, worker._check):
         called.clear()
         with pytest.raises(InterruptedError):
             run(made)

@@ -41,18 +41,18 @@ _SECONDS, _SECONDS_PER_MB = 120.0, 10.0
 def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
     """Return a reader that calls this one in another process; its library is of an extra.
 
-    With `uv=True` it reads texture coordinates, too.
+    With `uv=True` it reads texture coordinates, too; other options are the reader's.
 
     The reader raises :class:`MissingExtra` where neither it nor the other library is installed.
     """
 
-    def read(path: Path, *, uv: bool = False) -> Soup:
+    def read(path: Path, **options: Any) -> Soup:
         if not other or find_spec(other) is None:
             require(extra, f"reading {path.suffix} files", module)
         with tempfile.TemporaryDirectory() as name:
             folder = Path(name)
-            reads = [reader.__module__, reader.__name__, str(path.absolute()), name, *(["uv"] * uv)]
-            command = [sys.executable, "-P", "-m", __name__, *reads]
+            reads = [reader.__module__, reader.__name__, str(path.absolute()), name]
+            command = [sys.executable, "-P", "-m", __name__, *reads, json.dumps(options)]
             nowhere: Any = dict.fromkeys(("stdin", "stdout", "stderr"), subprocess.DEVNULL)
             most = _SECONDS + _SECONDS_PER_MB * path.stat().st_size / 1e6
             try:
@@ -65,7 +65,7 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
             if (folder / _ERROR).exists():
                 raise MeshError((folder / _ERROR).read_text(encoding="utf-8"))
             if ended.returncode == 0:
-                return _soup(folder / _SOUP, uv=uv)
+                return _soup(folder / _SOUP, uv=options.get("uv", False))
         if ended.returncode == _NO_MEMORY:
             raise MemoryError
         how = f"code {ended.returncode}"
@@ -81,30 +81,25 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
 
 def _soup(file: Path, *, uv: bool) -> Soup:
     try:
-        arrays = read_arrays(file, ("V", "corners", "sizes", "notices", *(_UV if uv else ())))
+        arrays: dict[str, Any] = read_arrays(
+            file, ("V", "corners", "sizes", "notices", *(_UV if uv else ()))
+        )
     except RecordError as error:
         raise MeshError(str(error)) from error
-    pairs = json.loads(str(arrays["notices"]))
+    pairs = json.loads(str(arrays.pop("notices")))
     notices = tuple(Notice(NoticeKind(kind), text) for kind, text in pairs)
-    return Soup(
-        arrays["V"],
-        arrays["corners"],
-        arrays["sizes"],
-        notices=notices,
-        uv=arrays.get("uv"),
-        uv_index=arrays.get("uv_index"),
-    )
+    return Soup(**arrays, notices=notices)
 
 
-def _main(module: str, reader: str, path: str, folder: str, *uv: str) -> int:
+def _main(module: str, reader: str, path: str, folder: str, options: str) -> int:
     """Call a reader, and write its surface or the words of its error to a folder."""
     read: Reader = getattr(import_module(module), reader)
     _bound_memory()
     try:
-        soup = read(Path(path), **dict.fromkeys(uv, True))
+        soup = read(Path(path), **json.loads(options))
         notices = np.array(json.dumps([(notice.kind, notice.text) for notice in soup.notices]))
         fields = {"V": soup.V, "corners": soup.corners, "sizes": soup.sizes, "notices": notices}
-        if uv:
+        if json.loads(options).get("uv"):
             none = np.empty(0, dtype=np.complex128)
             fields["uv"] = none if soup.uv is None else soup.uv
             fields["uv_index"] = soup.corners if soup.uv_index is None else soup.uv_index
