@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.laplacian import double_areas
 from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
@@ -99,11 +98,6 @@ class Shells:
             size += len(copies[-1])
         is_cut = any(part.cut for part in self.parts)
         return np.concatenate([uv, *copies]), corners if is_cut else None
-
-
-def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
-    """Return the area of each surface, twice."""
-    return [float(double_areas(one.mesh.V, one.mesh.F).sum()) for one in surfaces]
 
 
 def read_shells(

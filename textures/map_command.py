@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.api.map_files import map_files
 from cembench.commands.app import app
 from cembench.commands.console import (
     SHOWN,
@@ -22,8 +21,10 @@ from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
 from cembench.core.notices import NoticeKind
 
+from .map_files import map_files
+
 if TYPE_CHECKING:
-    from cembench.api.map_surfaces import Mapped, Maps
+    from .maps import Mapped, Maps
 
 
 @app.command(
