@@ -21,8 +21,7 @@ from cembench.running.plan import Task
 from cembench.running.surfaces import SurfaceFile
 
 from .components import Shells
-from .outputs import draw_maps
-from .writing import FileOptions, write_extras, write_shells, write_together
+from .writing import FileOptions, draw_maps, write_extras, write_shells, write_together
 
 #: Notices, each with the file it is about.
 Notices = tuple[tuple[Path, Notice], ...]
@@ -137,15 +136,16 @@ class Maps:
 
     def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Notices:
         notices: tuple[Notice, ...] = ()
-        maps = self._maps(own, file.output)
-        shells = Shells.of([m.surface for m in own]) if self.overlay else file.shells
-        if maps and file.output is not None:
-            atlas = own[0].record.target == "atlas"
-            notices = write_shells(file.output, shells, maps, self.file_options, atlas=atlas)
+        maps, options, record = self._maps(own, file.output), self.file_options, own[0].record
+        surfaces = [mapped.surface for mapped in own]
+        if maps and file.output is not None and self.overlay:
+            notices = write_together(file.output, surfaces, maps, options)
+        elif maps and file.output is not None:
+            is_atlas = record.target == "atlas"
+            notices = write_shells(file.output, file.shells, maps, options, atlas=is_atlas)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
-                equal = self.file_options.equal
-                draw_maps(shells, maps, file.picture, own[0].record, equal=equal)
+                draw_maps(surfaces, maps, file.picture, record, options)
         return tuple((file.output or file.shells.path, notice) for notice in notices)
 
     def _mapped(self, file: FileJobs, surface: SurfaceFile, task: Task) -> Mapped:

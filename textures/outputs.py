@@ -6,24 +6,16 @@ import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from cembench.api.settings import ON_THE_CIRCLE
-from cembench.conformal.atlas import laid_out
-from cembench.conformal.metrics import caption
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.overwriting import refuse_twice
 from cembench.core.wording import Advice
 from cembench.mesh.files import check_writable_format
-from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm
-from cembench.results.records import Record
 from cembench.running.measure import refinement_of
 
-from .components import Shells
-from .packing import side_by_side
 from .writing import FileOptions
 
 
@@ -195,30 +187,3 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
     ]
     refuse_twice(files, "surfaces", "Write them to different folders.")
     return list(files)
-
-
-def draw_maps(
-    shells: Shells,
-    maps: Sequence[NDArray[np.complex128]],
-    picture: Path,
-    record: Record,
-    *,
-    equal: bool,
-) -> None:
-    """Draw the surfaces of a file and their maps as a PNG: one with its recorded figures."""
-    from cembench.drawing.preview import write_preview
-
-    if len(maps) == 1:
-        title = f"{record.cell.mesh}: {record.title}"
-        words = caption(record.outcome.metrics)
-        mesh, z = shells.parts[0].mesh, maps[0]
-        if record.target == "atlas":
-            mesh, z = laid_out(mesh, z)
-        turned = record.target != "atlas"
-        write_preview(mesh, z, picture, title=title, caption=words, turned=turned)
-        return
-    moved = side_by_side(maps, shells.parts, equal=equal)
-    joined = Shells.of(shells.parts)
-    mesh = TriangleMesh.trusted(joined.V, joined.F, shells.path.stem)
-    title = f"{shells.path.stem}: {len(maps)} surfaces"
-    write_preview(mesh, np.concatenate(moved), picture, title=title, turned=False)

@@ -7,23 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.laplacian import double_areas
 from cembench.core.arrays import Complex
 from cembench.mesh.unit_square import to_unit_square
-from cembench.running.surfaces import SurfaceFile
 
 #: Gap between shells as a share of the atlas's side, so that their texels do not mix.
 _GAP = 1 / 128
 #: Smallest side of a shell, as a share of the largest.
 _SMALLEST = 1 / 16
-
-
-def side_by_side(
-    maps: Sequence[Complex], surfaces: Sequence[SurfaceFile], *, equal: bool
-) -> list[Complex]:
-    """Return the maps of surfaces packed into the unit square, by their areas."""
-    areas = [float(double_areas(one.mesh.V, one.mesh.F).sum()) for one in surfaces]
-    return packed(maps, areas, equal=equal)
 
 
 def packed(

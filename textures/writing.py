@@ -9,9 +9,18 @@ from pathlib import Path
 import numpy as np
 
 from cembench.api.parameterize import Result
-from cembench.api.save_map import checker_texture, placed, save_map, texture_files, write_with_uv
+from cembench.api.save_map import (
+    checker_texture,
+    joined,
+    placed,
+    save_map,
+    texture_files,
+    write_with_uv,
+)
 from cembench.api.settings import Placement
-from cembench.conformal.atlas import cut_map
+from cembench.conformal.atlas import cut_map, laid_out
+from cembench.conformal.laplacian import double_areas
+from cembench.conformal.metrics import caption
 from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.core.notices import Notice
@@ -19,10 +28,12 @@ from cembench.core.wording import Advice
 from cembench.mesh.files import write_mesh
 from cembench.mesh.formats import obj
 from cembench.mesh.soup import Soup, columns
+from cembench.mesh.triangle_mesh import TriangleMesh
+from cembench.results.records import Record
 from cembench.running.surfaces import SurfaceFile
 
 from .components import Shells
-from .packing import side_by_side
+from .packing import packed
 
 
 @dataclass(frozen=True)
@@ -67,18 +78,15 @@ def write_shells(
     repaired keeps its content and gets the coordinates. A surface that was cut is written uncut,
     with coordinates per corner; an `atlas` has an image for each corner anyway.
     """
-    mesh, name = shells.parts[0].mesh, shells.path.stem
+    mesh, several = shells.parts[0].mesh, len(maps) > 1
     if atlas:
         cut = cut_map(mesh, maps[0].reshape(-1, 3))
         uv = placed(cut.uv, options.place, mesh, cut.surface.F)
         soup = Soup.of_triangles(mesh.V, mesh.F, uv, cut.surface.F, name=mesh.name)
         texture = checker_texture(output, checker=options.checker)
         return write_with_uv(output, [soup], cut.uv, options.place, texture)
-    if len(maps) > 1:
-        moved = side_by_side(maps, shells.parts, equal=options.equal)
-    else:
-        moved, name = [placed(maps[0], options.place, mesh, mesh.F)], mesh.name
-    uv, corners = shells.joined(moved)
+    uv, corners = shells.joined(moved(shells.parts, maps, options))
+    name = shells.path.stem if several else mesh.name
     soup = Soup.of_triangles(shells.V, shells.F, uv, corners, name=name)
     texture, text = _texture(output, soup, options, shells), _obj_text(output, soup, shells)
     return write_with_uv(output, [soup], shells.joined(maps)[0], options.place, texture, text)
@@ -87,13 +95,48 @@ def write_shells(
 def write_together(
     output: Path, files: Sequence[SurfaceFile], maps: Sequence[Complex], options: FileOptions
 ) -> tuple[Notice, ...]:
-    """Write the surfaces of several files to one, as :func:`write_shells` does those of a file."""
+    """Write surfaces to a file that keeps nothing of those they were read from."""
     soups = []
-    for file, z in zip(files, side_by_side(maps, files, equal=options.equal), strict=True):
+    for file, z in zip(files, moved(files, maps, options), strict=True):
         mesh, corners = file.uncut or file.mesh, file.mesh.F if file.uncut else None
         soups.append(Soup.of_triangles(mesh.V, mesh.F, z, corners, name=file.mesh.name))
     texture = checker_texture(output, checker=options.checker)
     return write_with_uv(output, soups, np.concatenate(maps), options.place, texture)
+
+
+def moved(
+    files: Sequence[SurfaceFile], maps: Sequence[Complex], options: FileOptions
+) -> list[Complex]:
+    """Return maps where their coordinates lie: several side by side, by their surfaces' areas."""
+    meshes = [file.mesh for file in files]
+    if len(maps) == 1:
+        return [placed(maps[0], options.place, meshes[0], meshes[0].F)]
+    areas = [float(double_areas(mesh.V, mesh.F).sum()) for mesh in meshes]
+    return packed(maps, areas, equal=options.equal)
+
+
+def draw_maps(
+    files: Sequence[SurfaceFile],
+    maps: Sequence[Complex],
+    picture: Path,
+    record: Record,
+    options: FileOptions,
+) -> None:
+    """Draw the surfaces of a file and their maps as a PNG: one with its recorded figures."""
+    from cembench.drawing.preview import write_preview
+
+    mesh, z, name = files[0].mesh, maps[0], files[0].path.stem
+    title, about = f"{record.cell.mesh}: {record.title}", caption(record.outcome.metrics)
+    if len(maps) > 1:
+        together = zip(files, moved(files, maps, options), strict=True)
+        whole = joined([Soup.of_triangles(f.mesh.V, f.mesh.F, uv) for f, uv in together])
+        assert whole.uv is not None
+        mesh, z = TriangleMesh.trusted(whole.V, whole.triangles, name), whole.uv
+        title, about = f"{name}: {len(maps)} surfaces", ""
+    elif record.target == "atlas":
+        mesh, z = laid_out(mesh, z)
+    turned = len(maps) == 1 and record.target != "atlas"
+    write_preview(mesh, z, picture, title=title, caption=about, turned=turned)
 
 
 def write_extras(options: FileOptions, result: Result) -> tuple[Notice, ...]:
