@@ -30,12 +30,12 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
-from cembench.report.render.html import render
+from cembench.report.render.html import environment, render, write_html
 from cembench.results.machines import machine_of, machine_of_record, software_differences
 from cembench.results.multiple_testing import geometric
 from cembench.results.records import REFERENCE
 
-from .leaderboard import Entrant, leaderboard
+from .leaderboard import Entrant, commit_of, leaderboard
 
 #: Called with the run's name, the number done and the total.
 Progress = Callable[[str, int, int], None]
@@ -124,7 +124,9 @@ def write_site(
             progress("index", len(runs), len(runs))
             published.sort(key=lambda one: (one.date, one.name))
             _write_index(published, draft)
-            _write_leaderboard(entrants, draft)
+            entrants.sort(key=lambda one: one.name)
+            place = draft / "leaderboard"
+            write_html(leaderboard(entrants, "cembench publish", place), place)
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
@@ -144,12 +146,9 @@ def about(evidence: Evidence, name: str) -> PublishedRun:
     records = evidence.records
     machines = Counter(machine_of_record(record, environments) for record in records)
     used = {record.environment for record in records}
-    commits = {
-        str(git.get("commit"))[:10] + ("+" if git.get("dirty") else "")
-        for key in used
-        if isinstance(git := environments.get(key, {}).get("git"), Mapping)
-    }
-    versions = {str(environments.get(key, {}).get("cembench") or "") for key in used} - {""}
+    described = [environments.get(key, {}) for key in sorted(used)]
+    commits = {commit_of(one) for one in described} - {""}
+    versions = {str(one.get("cembench") or "") for one in described} - {""}
     ratios: dict[str, dict[str, float]] = {}
     for record in records:
         rate = evidence.rate(record) if record.outcome.status == "ok" else None
@@ -167,10 +166,7 @@ def about(evidence: Evidence, name: str) -> PublishedRun:
         ok=sum(record.outcome.status == "ok" for record in records),
         surfaces=len(evidence.surfaces),
         machines=dict(machines),
-        processors={
-            machine_of(environments.get(key, {})): str(environments.get(key, {}).get("cpu") or "-")
-            for key in sorted(used)
-        },
+        processors={machine_of(one): str(one.get("cpu") or "-") for one in described},
         ratios=ratios,
         differing=tuple(software_differences(records, environments)),
     )
@@ -203,8 +199,6 @@ def _headline(own: Mapping[str, float], common: Set[str]) -> HeadlineRatio:
 
 
 def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
-    from cembench.report.render.html import environment
-
     here = Path(__file__).parent
     ratios = history(runs)
     if len(runs) > 1 and ratios:
@@ -219,14 +213,6 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
         version=installed_version(),
     )
     write_text(draft / "index.html", text)
-
-
-def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:
-    from cembench.report.render.html import write_html
-
-    ordered = sorted(entrants, key=lambda one: one.name)
-    place = draft / "leaderboard"
-    write_html(leaderboard(ordered, "cembench publish", place), place)
 
 
 def _plot(runs: Sequence[PublishedRun], ratios: Mapping[str, list[HeadlineRatio | None]]) -> Plot:

@@ -163,7 +163,6 @@ def map_files(
     (True, 'flat_uv.obj')
 
     """
-    from dataclasses import replace
     from os import PathLike
     from pathlib import Path
 
@@ -179,7 +178,7 @@ def map_files(
         check_options,
         check_shells,
         output_files,
-        picture_files,
+        picture_file,
     )
     from .writing import FileOptions
 
@@ -229,12 +228,16 @@ def map_files(
             taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
             role = {mesh.name: provenance_of(registry, mesh)}
             tasks += plan_cells([taken], [mesh], parameters or {}, settings, plugins, role)
-        files.append(FileJobs(shells, tuple(tasks), None if together else place))
-    if preview:
-        chosen = [file.tasks[0].algorithm for file in files]
-        pictures = picture_files(sources, chosen, [f.output for f in files], overwrite=overwrite)
-        refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")
-        files = [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
+        to = None if together else place
+        picture = picture_file(source, tasks[0].algorithm, to) if preview else None
+        files.append(FileJobs(shells, tuple(tasks), to, picture))
+    pictures = [file.picture for file in files if file.picture is not None]
+    refuse_twice(pictures, "pictures", "Draw them one at a time.")
+    refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")
+    for picture in pictures if not overwrite else ():
+        from cembench.drawing.replaceable_pictures import check_replaceable
+
+        check_replaceable(picture)
     for folder in {path.parent for path in written}:
         folder.mkdir(exist_ok=True)
     return Maps(

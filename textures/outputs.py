@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import shlex
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cembench.api.settings import ON_THE_CIRCLE
@@ -37,7 +37,7 @@ def check_algorithms(
     atlas = next((a for a in candidates if a.target == "atlas"), None)
     if overlay:
         refinement_of(first)
-    exclusions = {
+    exclusions: dict[str, object] = {
         "{overlay} refines both banks of a cut in different places, so the surface cannot be "
         "written uncut: leave out {cut}, and map what {command} writes.": overlay and cut,
         "{overlay} makes triangles that the texture's own UVs do not know: leave out {bake}, and "
@@ -53,16 +53,21 @@ def check_algorithms(
         "{flat} and {bake}, which need one UV per vertex.": atlas
         and (options.extras.keys() - {"html"} or bake or surfaces > 1),
     }
+    _refuse(
+        exclusions,
+        name=first.name,
+        other=other.name,
+        target=other.target,
+        command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
+        listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
+    )
+
+
+def _refuse(exclusions: Mapping[str, object], **values: object) -> None:
+    """Raise :class:`ParameterError` with the first message that is true of the call."""
     for message, excluded in exclusions.items():
         if excluded:
-            raise ParameterError.about(
-                message,
-                name=first.name,
-                other=other.name,
-                target=other.target,
-                command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
-                listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
-            )
+            raise ParameterError.about(message, **values)
 
 
 def check_options(
@@ -70,7 +75,7 @@ def check_options(
 ) -> None:
     """Raise the errors of textures and extra files before anything is mapped."""
     several, shared = len(meshes) > 1, len(set(outputs)) < len(outputs) and outputs[0]
-    exclusions = {
+    exclusions: dict[str, object] = {
         "{checker} and {bake} each give a texture; choose one.": options.checker and options.bake,
         "{bake} works with one surface; map them one by one.": options.bake and several,
         "{checker} and {bake} need a file that uses the texture: add {output}.": options.textured
@@ -80,9 +85,7 @@ def check_options(
         "{geometry_image}, {remesh}, {flat} and {html} take one surface; map them one by "
         "one.": options.extras and several,
     }
-    for message, excluded in exclusions.items():
-        if excluded:
-            raise ParameterError.about(message)
+    _refuse(exclusions)
     if options.bake:
         from .bake import read_texture
 
@@ -104,55 +107,24 @@ def check_options(
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
     """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
-    exclusions = {
-        "{geometry_image}, {remesh}, {flat} and {html} take one. {each} gives each alone": bool(
-            options.extras
-        ),
-        "they share the unit square: leave out {uv}": options.place != "unit",
+    each = Advice(
+        f"`cembench.repair({str(path)!r}, components='all').meshes`",
+        f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
+    )
+    exclusions: dict[str, object] = {
+        "{path} holds {surfaces} surfaces; {geometry_image}, {remesh}, {flat} and {html} take "
+        "one. {each} gives each alone.": options.extras,
+        "{path} holds {surfaces} surfaces, which share the unit square: leave out "
+        "{uv}.": options.place != "unit",
     }
-    for message, excluded in exclusions.items():
-        if excluded and surfaces > 1:
-            raise ParameterError.about(
-                f"{{path}} holds {{surfaces}} surfaces; {message}.",
-                path=path,
-                surfaces=surfaces,
-                each=Advice(
-                    f"`cembench.repair({str(path)!r}, components='all').meshes`",
-                    f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
-                ),
-            )
+    if surfaces > 1:
+        _refuse(exclusions, path=path, surfaces=surfaces, each=each)
 
 
-def picture_files(
-    sources: Sequence[Path],
-    chosen: Sequence[Algorithm],
-    outputs: Sequence[Path | None],
-    *,
-    overwrite: bool,
-) -> list[Path]:
-    """Return the path of each file's picture: beside its output, or in the current folder.
-
-    Raises
-    ------
-    ParameterError
-        Two pictures would have the same path.
-    RenderError
-        A file that is not one of our pictures would be overwritten.
-
-    """
-    pictures = [
-        Path(f"{file_name(f'{source.stem}_{algorithm.name}')}.png")
-        if target is None
-        else target.with_suffix(".png")
-        for source, algorithm, target in zip(sources, chosen, outputs, strict=True)
-    ]
-    refuse_twice(pictures, "pictures", "Draw them one at a time.")
-    if not overwrite:
-        from cembench.drawing.replaceable_pictures import check_replaceable
-
-        for picture in pictures:
-            check_replaceable(picture)
-    return pictures
+def picture_file(source: Path, algorithm: Algorithm, output: Path | None) -> Path:
+    """Return the path of a file's picture: beside its output, or in the current folder."""
+    name = file_name(f"{source.stem}_{algorithm.name}")
+    return Path(f"{name}.png") if output is None else output.with_suffix(".png")
 
 
 def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | None]:

@@ -176,15 +176,12 @@ def local_files(
     from cembench.mesh import datasets
     from cembench.running.surfaces import file_named, is_generated
 
-    known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
-    fetched = {}
-    for path in known:
+    def local(path: Path) -> Path:
+        if path.exists() or str(path) not in registry.datasets:
+            return path if is_generated(str(path), registry) else file_named(path, registry)
         dataset = registry.dataset(str(path))
         with reporter.downloads([dataset]) as progress:
             datasets.fetch(dataset, progress=progress(dataset))
-        fetched[path] = datasets.surface_file(dataset)
-    return [
-        fetched.get(path)
-        or (path if is_generated(str(path), registry) else file_named(path, registry))
-        for path in meshes
-    ]
+        return datasets.surface_file(dataset)
+
+    return [local(path) for path in meshes]
