@@ -272,8 +272,10 @@ def _share(cells: pd.DataFrame) -> Value:
 
 def commit_of(environment: Mapping[str, Any]) -> str:
     """Return the commit of an environment, with a plus where files were changed; "" if unknown."""
-    git = environment.get("git") or {}
-    return f"{git['commit']}"[:10] + "+" * bool(git.get("dirty")) if git.get("commit") else ""
+    git = environment.get("git")
+    if not isinstance(git, Mapping) or not git.get("commit"):
+        return ""
+    return str(git["commit"])[:10] + ("+" if git.get("dirty") else "")
 
 
 def _machines(entrants: Sequence[Entrant]) -> Table:
