@@ -31,6 +31,7 @@ ELSEWHERE = {
     "papers": "papers",
     "surfaces": "meshes_gen",
     "sharing": "sharing",
+    "textures": "textures",
 }
 #: Which code is named as what: the first that fits. Other code has no part in figures.
 GROUPS = {

@@ -10,7 +10,6 @@ from cembench.api.catalogue import surface as surface
 from cembench.api.cut import cut as cut
 from cembench.api.fetch import PublicSurfaces as PublicSurfaces
 from cembench.api.fetch import fetch as fetch
-from cembench.api.map_files import map_files as map_files
 from cembench.api.measure import measure as measure
 from cembench.api.measurement import Measurement as Measurement
 from cembench.api.papers import check_paper as check_paper

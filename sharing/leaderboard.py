@@ -15,6 +15,8 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, Variant, difference
 from cembench.report.content.standings import title_of
@@ -192,10 +194,7 @@ def _frame(entrants: Sequence[Entrant]) -> pd.DataFrame:
             run=entrant.name,
             object=frame["family"],
             # What is not repeatable is not called the fastest.
-            as_good=[
-                good and not scatters(record)
-                for good, record in zip(frame["as_good"], records, strict=True)
-            ],
+            as_good=frame["as_good"].astype(bool) & ~np.array([*map(scatters, records)], bool),
             label=[apart.get(label, label) for label in frame["label"]],
             record=[f"{number:03d}{key}" for key in frame["key"]],
             machine=[machine_of_record(record, environments) for record in records],
@@ -249,13 +248,11 @@ def _success(frame: pd.DataFrame) -> Table:
     """Count the valid maps by family of surfaces."""
     tried = frame[frame["main"] & (frame["status"] != "skipped")]
     families = sorted(tried["family"].unique())
+    lacking = missing("it was not tried on this family")
     rows: list[list[Plain]] = []
     for label, group in tried.groupby("label"):
-        cells: list[Plain] = [str(label)]
-        for chosen in [*families, None]:
-            some = group if chosen is None else group[group["family"] == chosen]
-            cells.append(_share(some) if len(some) else missing("it was not tried on this family"))
-        rows.append(cells)
+        shares = {name: _share(some) for name, some in group.groupby("family")}
+        rows.append([str(label), *(shares.get(n, lacking) for n in families), _share(group)])
     rows.sort(key=lambda row: (-(row[-1].number or 0.0), row[0]))  # type: ignore[union-attr]
     return Table.of(
         "success-by-family",
@@ -273,26 +270,31 @@ def _share(cells: pd.DataFrame) -> Value:
     return Value(f"{share:.3g} % of {len(cells)}", share, "surface", str(first["record"]))
 
 
+def commit_of(environment: Mapping[str, Any]) -> str:
+    """Return the commit of an environment, with a plus where files were changed; "" if unknown."""
+    git = environment.get("git")
+    if not isinstance(git, Mapping) or not git.get("commit"):
+        return ""
+    return str(git["commit"])[:10] + ("+" if git.get("dirty") else "")
+
+
 def _machines(entrants: Sequence[Entrant]) -> Table:
     rows: list[list[Plain]] = []
     for number, entrant in enumerate(entrants):
         environments = entrant.evidence.store.environments()
         timed: dict[str, list[tuple[float, str]]] = {}
         for record in entrant.evidence.records:
-            key = f"{number:03d}{record.cell.key}"
-            timed.setdefault(record.environment, []).extend(
-                (r.kernel_seconds, key) for r in record.outcome.rounds if r.kernel_seconds
-            )
+            key, place = f"{number:03d}{record.cell.key}", timed.setdefault(record.environment, [])
+            place += [(r.kernel_seconds, key) for r in record.outcome.rounds if r.kernel_seconds]
         for environment, kernels in timed.items():
             about = environments.get(environment, {})
-            git = about.get("git") or {}
             seconds, key = sorted(kernels)[(len(kernels) - 1) // 2] if kernels else (None, "")
             kernel = seconds and 1000 * seconds
             timing = entry(kernel, ".3g", "no kernel was timed", origin="surface", record=key)
-            commit = str(git.get("commit") or "-")[:10] + ("+" if git.get("dirty") else "")
             machine = (machine_of(about) or "not named", str(about.get("cpu") or "-"))
-            software = (str(about.get("cembench") or "-"), commit, entrant.signer or "-")
-            rows.append([entrant.name, *machine, about.get("cores"), timing, *software])
+            software = [str(about.get("cembench") or ""), commit_of(about), entrant.signer]
+            rows.append([entrant.name, *machine, about.get("cores"), timing])
+            rows[-1] += [one or "-" for one in software]
     return Table.of(
         "machines",
         "Machines and software",

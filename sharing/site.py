@@ -13,12 +13,13 @@ Every link is relative and nothing is asked of the network: it works from a disk
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
-from math import exp, log
 from pathlib import Path
-from statistics import mean
 from types import MappingProxyType
+
+import numpy as np
 
 from cembench.core import folders
 from cembench.core.atomic import draft_folder, unwritable, write_text
@@ -29,11 +30,12 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.content.report import build_report
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
-from cembench.report.render.html import render
+from cembench.report.render.html import environment, render, write_html
 from cembench.results.machines import machine_of, machine_of_record, software_differences
+from cembench.results.multiple_testing import geometric
 from cembench.results.records import REFERENCE
 
-from .leaderboard import Entrant, leaderboard
+from .leaderboard import Entrant, commit_of, leaderboard
 
 #: Called with the run's name, the number done and the total.
 Progress = Callable[[str, int, int], None]
@@ -122,7 +124,9 @@ def write_site(
             progress("index", len(runs), len(runs))
             published.sort(key=lambda one: (one.date, one.name))
             _write_index(published, draft)
-            _write_leaderboard(entrants, draft)
+            entrants.sort(key=lambda one: one.name)
+            place = draft / "leaderboard"
+            write_html(leaderboard(entrants, "cembench publish", place), place)
             folders.publish(draft, folder, "report")
     except OSError as error:
         raise unwritable(folder, error) from error
@@ -140,24 +144,18 @@ def about(evidence: Evidence, name: str) -> PublishedRun:
     """Gather what the index says of a run."""
     environments = evidence.store.environments()
     records = evidence.records
-    machines: dict[str, int] = {}
-    for record in records:
-        machine = machine_of_record(record, environments)
-        machines[machine] = machines.get(machine, 0) + 1
+    machines = Counter(machine_of_record(record, environments) for record in records)
     used = {record.environment for record in records}
-    commits = {
-        str(git.get("commit"))[:10] + ("+" if git.get("dirty") else "")
-        for key in used
-        if isinstance(git := environments.get(key, {}).get("git"), Mapping)
-    }
-    versions = {str(environments.get(key, {}).get("cembench") or "") for key in used} - {""}
+    described = [environments.get(key, {}) for key in sorted(used)]
+    commits = {commit_of(one) for one in described} - {""}
+    versions = {str(one.get("cembench") or "") for one in described} - {""}
     ratios: dict[str, dict[str, float]] = {}
     for record in records:
         rate = evidence.rate(record) if record.outcome.status == "ok" else None
-        base = evidence.base(record)
-        if base is None or base.cell.algorithm != evidence.reference:
-            continue  # another target is another contest
-        if rate is not None and base.environment == record.environment:
+        base = evidence.base(record)  # of another target it is another algorithm
+        if base is None or rate is None or base.environment != record.environment:
+            continue
+        if base.cell.algorithm == evidence.reference:
             place = f"{record.cell.mesh_hash} {record.cell.solves}"
             ratios.setdefault(record.cell.algorithm, {})[place] = 1 + rate
     return PublishedRun(
@@ -167,11 +165,8 @@ def about(evidence: Evidence, name: str) -> PublishedRun:
         cells=len(records),
         ok=sum(record.outcome.status == "ok" for record in records),
         surfaces=len(evidence.surfaces),
-        machines=machines,
-        processors={
-            machine_of(environments.get(key, {})): str(environments.get(key, {}).get("cpu") or "-")
-            for key in sorted(used)
-        },
+        machines=dict(machines),
+        processors={machine_of(one): str(one.get("cpu") or "-") for one in described},
         ratios=ratios,
         differing=tuple(software_differences(records, environments)),
     )
@@ -191,24 +186,19 @@ def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None
     """
     by_series: dict[str, list[HeadlineRatio | None]] = {}
     for name in sorted({name for run in runs for name in run.ratios}):
-        having = [set(run.ratios[name]) for run in runs if name in run.ratios]
-        common = set.intersection(*having)
-        row: list[HeadlineRatio | None] = []
-        for run in runs:
-            own = run.ratios.get(name)
-            if own is None:
-                row.append(None)
-                continue
-            chosen = common or set(own)
-            average = exp(mean(log(own[place]) for place in sorted(chosen)))
-            row.append(HeadlineRatio(average, len(chosen), bool(common)))
-        by_series[name] = row
+        held = [run.ratios.get(name) for run in runs]
+        common = set.intersection(*(set(own) for own in held if own))
+        by_series[name] = [_headline(own, common) if own else None for own in held]
     return by_series
 
 
-def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
-    from cembench.report.render.html import environment
+def _headline(own: Mapping[str, float], common: Set[str]) -> HeadlineRatio:
+    chosen = sorted(common or own)
+    average = float(geometric(np.array([own[place] for place in chosen])))
+    return HeadlineRatio(average, len(chosen), bool(common))
 
+
+def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
     here = Path(__file__).parent
     ratios = history(runs)
     if len(runs) > 1 and ratios:
@@ -223,14 +213,6 @@ def _write_index(runs: Sequence[PublishedRun], draft: Path) -> None:
         version=installed_version(),
     )
     write_text(draft / "index.html", text)
-
-
-def _write_leaderboard(entrants: Sequence[Entrant], draft: Path) -> None:
-    from cembench.report.render.html import write_html
-
-    ordered = sorted(entrants, key=lambda one: one.name)
-    place = draft / "leaderboard"
-    write_html(leaderboard(ordered, "cembench publish", place), place)
 
 
 def _plot(runs: Sequence[PublishedRun], ratios: Mapping[str, list[HeadlineRatio | None]]) -> Plot:

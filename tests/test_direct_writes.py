@@ -10,7 +10,16 @@ from pathlib import Path
 import pytest
 
 PROJECT = Path(__file__).parents[1]
-PACKAGES = ("algorithms", "benchmarks", "cembench", "examples", "meshes_gen", "papers", "sharing")
+PACKAGES = (
+    "algorithms",
+    "benchmarks",
+    "cembench",
+    "examples",
+    "meshes_gen",
+    "papers",
+    "sharing",
+    "textures",
+)
 #: Functions that may write directly, and why.
 ALLOWED = {
     "benchmarks/kept_run.py": "a copy that is made again when it was cut off",

@@ -11,7 +11,7 @@ import cembench
 
 ROOT = Path(__file__).parents[1]
 #: The folders whose docstrings are looked at.
-FOLDERS = ("algorithms", "cembench", "meshes_gen", "papers", "sharing")
+FOLDERS = ("algorithms", "cembench", "meshes_gen", "papers", "sharing", "textures")
 #: Checks of numpydoc that are not made, and why.
 LEFT_OUT = {
     "GL01": "the summary begins on the line of the quotes",

@@ -59,7 +59,7 @@ def decisions(source):
 
 def test_no_code_decides_on_the_wording_of_a_message():
     found, used = [], set()
-    for folder in ("cembench", "algorithms", "meshes_gen", "papers", "sharing"):
+    for folder in ("cembench", "algorithms", "meshes_gen", "papers", "sharing", "textures"):
         for path in sorted((ROOT / folder).rglob("*.py")):
             name = path.relative_to(ROOT).as_posix()
             for line, words in decisions(path.read_text()):

@@ -13,6 +13,7 @@ from cembench.core.reporter import SILENT, Reporter
 if TYPE_CHECKING:
     from cembench.core.errors import CembenchError
     from cembench.mesh.datasets import Dataset
+    from cembench.registry import Registry
 
 
 class PublicSurfaces(dict[str, Path]):
@@ -157,3 +158,30 @@ def about(dataset: Dataset) -> dict[str, Any]:
         **{name: None if (one := getattr(dataset, name)) == "" else one for name in facts},
         **{"size": size, "fetched": is_fetched(dataset), "path": str(dataset.path)},
     }
+
+
+def local_files(
+    meshes: Sequence[Path], registry: Registry, reporter: Reporter = SILENT
+) -> list[Path]:
+    """Return the file of each path or name of a public surface, which is fetched if necessary.
+
+    A generated surface keeps its name.
+
+    Raises
+    ------
+    MeshError
+        A name is that of no surface.
+
+    """
+    from cembench.mesh import datasets
+    from cembench.running.surfaces import file_named, is_generated
+
+    def local(path: Path) -> Path:
+        if path.exists() or str(path) not in registry.datasets:
+            return path if is_generated(str(path), registry) else file_named(path, registry)
+        dataset = registry.dataset(str(path))
+        with reporter.downloads([dataset]) as progress:
+            datasets.fetch(dataset, progress=progress(dataset))
+        return datasets.surface_file(dataset)
+
+    return [local(path) for path in meshes]

@@ -9,21 +9,22 @@ import warnings
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from importlib.metadata import entry_points
 from pathlib import Path
+from types import MethodType
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.api.map_files import MapTarget, algorithms_named
 from cembench.api.notebook import html_table, is_notebook, show_page
-from cembench.api.settings import Placement, Threads
+from cembench.api.settings import MapTarget, Placement, Threads, algorithms_named
 from cembench.core.arguments import checked
 from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.names import file_name, unknown
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.plausibility import implausible
-from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
+from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, load_registry
 from cembench.results.records import Outcome
 from cembench.running.in_this_process import numerical_threads
@@ -167,13 +168,13 @@ class Result:
             `uv` is unknown, or "square" for a map that is no disk.
 
         """
-        from cembench.api.write_maps import FileOptions, beside, save_map
+        from cembench.api.save_map import save_map, texture_files
         from cembench.core.overwriting import refuse_present
 
-        path, file_options = Path(path), FileOptions(uv, checker)
+        path = Path(path)
         check_writable_format(path, with_uv=True)
-        refuse_present((path, *beside(path, file_options)), force=overwrite)
-        for notice in save_map(path, self.mesh, self.z, file_options):
+        refuse_present((path, *(texture_files(path) if checker else ())), force=overwrite)
+        for notice in save_map(path, self.mesh, self.z, uv, checker=checker):
             warnings.warn(f"{path}: {notice}", stacklevel=2)
         return path
 
@@ -182,7 +183,7 @@ class Result:
 
         Its vertices and triangles have the surface's numbers, and it has the surface's area.
         """
-        from cembench.api.write_maps import flattened
+        from cembench.api.save_map import flattened
 
         return flattened(self.mesh, self.z)
 
@@ -226,44 +227,15 @@ class Result:
             )
         return certificate
 
-    def geometry_image(self, side: int = 257) -> NDArray[np.float64]:
-        """Return the surface sampled on a regular grid of the map.
+    def __getattr__(self, name: str) -> Any:
+        """Return a function of the entry point group ``cembench.result`` as a method."""
+        if not name.startswith("_"):
+            for entry in entry_points(group="cembench.result", name=name):
+                return MethodType(entry.load(), self)
+        raise AttributeError(f"a Result has no attribute {name!r}", name=name, obj=self)
 
-        Parameters
-        ----------
-        side : int
-            Samples along a side.
-
-        Returns
-        -------
-        float64 (side, side, 3)
-            Points of the surface. A map onto the disk is sampled on the square, see
-            :func:`cembench.conformal.resample.geometry_image`.
-
-        """
-        from cembench.conformal.resample import geometry_image
-
-        square = self.algorithm.target == "disk"
-        return geometry_image(self.mesh, self.z, side, "square" if square else "disk")
-
-    def remesh(self, side: int = 65) -> DiskMesh:
-        """Return the surface remeshed with triangles that are equilateral in the disk.
-
-        Parameters
-        ----------
-        side : int
-            Lattice points along the disk's diameter; see
-            :func:`cembench.conformal.resample.regular_remesh`.
-
-        Returns
-        -------
-        DiskMesh
-            The new mesh.
-
-        """
-        from cembench.conformal.resample import regular_remesh
-
-        return regular_remesh(self.mesh, self.z, side)[0]
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *entry_points(group="cembench.result").names]
 
     def plot(self, path: str | os.PathLike[str] | None = None) -> Figure:
         """Draw the surface and its image under the same checkerboard.

@@ -9,8 +9,8 @@ from concurrent.futures import Future
 from functools import partial
 from typing import Any, Literal
 
-from cembench.api.map_files import MapTarget
 from cembench.api.parameterize import Check, Result, parameterize
+from cembench.api.settings import MapTarget
 from cembench.core.errors import CembenchError, ParameterError
 from cembench.registry import load_registry
 from cembench.running.process_pool import process_pool

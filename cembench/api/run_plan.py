@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cembench.api.map_surfaces import local_files
+from cembench.api.fetch import local_files
 from cembench.api.sets import Gathered, gathered, surfaces_of_set
 from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError

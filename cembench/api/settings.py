@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 
 from cembench.core.arguments import Range
@@ -37,6 +37,17 @@ Timeout: TypeAlias = Annotated[float, Range(0.1, LONGEST)]
 Faces: TypeAlias = Annotated[int, Range(1, MOST_FACES)]
 Rounds: TypeAlias = Annotated[int, Range(1, 10_000)]
 Seed: TypeAlias = Annotated[int, Range(0, 2**63 - 1)]
+
+#: What a map is for: the plane for textures, the disk for comparisons and registration.
+MapTarget: TypeAlias = Literal["plane", "disk", "circular holes"]
+#: The recommended algorithms by target; the first that takes the surface is used.
+RECOMMENDED: Mapping[MapTarget, tuple[str, ...]] = {
+    "plane": ("plane", "plane-holes"),
+    "disk": ("direct-cem", "direct-cem-holes"),
+    "circular holes": ("direct-cem-holes",),
+}
+#: Names that stand for one algorithm on disks and another on surfaces with holes.
+_SEVERAL = {"best": ("best", "best-holes"), "plane": RECOMMENDED["plane"]}
 
 _UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0}
 
@@ -140,3 +151,24 @@ def registry_with(plugins: Sequence[str], reporter: Reporter = SILENT) -> Regist
 
     with reporter.busy(f"importing {', '.join(plugins)}"):
         return load_with_plugins(plugins)
+
+
+def algorithms_named(name: str | None, target: MapTarget | None) -> tuple[str, ...]:
+    """Return the algorithms that a name or a target stands for; the first that takes a surface
+    maps it.
+
+    Raises
+    ------
+    ParameterError
+        Both are given, or the target is unknown.
+
+    """
+    if target is not None and target not in RECOMMENDED:
+        allowed = ", ".join(map(repr, RECOMMENDED))
+        raise ParameterError(f"target={target!r} is unknown; allowed: {allowed}.")
+    if name is not None and target is not None:
+        raise ParameterError(
+            f"algorithm={name!r} and target={target!r} exclude each other: an algorithm has one "
+            "target. Give only one of them."
+        )
+    return RECOMMENDED[target or "plane"] if name is None else _SEVERAL.get(name, (name,))

@@ -21,7 +21,6 @@ from cembench.commands.exit_codes import Verbs, ending
 #: each.
 MODULES = {
     "catalogue": {"list": "api.catalogue:catalogue", "doctor": "commands.catalogue:doctor"},
-    "map": {"map": "api.map_files:map_files"},
     "measure": {"measure": "api.measure:measure"},
     "benchmark": {"run": "api.benchmark:benchmark"},
     "report": {"report": "api.benchmark:report"},
@@ -36,6 +35,8 @@ MODULES = {
     "repair": {"repair": "api.repair:repair"},
     "cut": {"cut": "api.cut:cut"},
 }
+#: The verbs that the help shows before all others.
+FIRST = ("list", "doctor", "map")
 #: Options after which no command is called: their answer needs the first lines of the help alone.
 OF_NO_COMMAND = ("-h", "--help", "-V", "--version")
 
@@ -86,6 +87,7 @@ def load(word: str = "") -> None:
         from cembench.commands.exhibits import add
 
         add(entry)
+    app.registered_commands.sort(key=lambda one: _place(one.name or one.callback.__name__))  # type: ignore[union-attr]
 
 
 def brought() -> list[EntryPoint]:
@@ -97,7 +99,12 @@ def descriptions() -> dict[str, str]:
     """Return the first sentence of each command's help, read without importing its module."""
     own = {v: f"cembench.{where}" for verbs in MODULES.values() for v, where in verbs.items()}
     others = {entry.name: f"{entry.module}:{entry.attr or entry.name}" for entry in brought()}
-    return {verb: _first_line(*where.split(":")) for verb, where in (own | others).items()}
+    places = own | others
+    return {verb: _first_line(*places[verb].split(":")) for verb in sorted(places, key=_place)}
+
+
+def _place(verb: str) -> int:
+    return FIRST.index(verb) if verb in FIRST else len(FIRST)
 
 
 def _first_line(module: str, name: str) -> str:

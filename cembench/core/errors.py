@@ -186,12 +186,12 @@ class RenderError(CembenchError):
 
     Examples
     --------
-    >>> from pathlib import Path
-    >>> from cembench.drawing.texture import read_texture
-    >>> read_texture(Path("nowhere.png"))  # doctest: +ELLIPSIS
+    >>> import cembench
+    >>> result = cembench.parameterize(cembench.surface("flat-disk", 200))
+    >>> result.show("nowhere/a.html")  # doctest: +ELLIPSIS
     Traceback (most recent call last):
     ...
-    cembench.core.errors.RenderError: the texture nowhere.png cannot be read: ...
+    cembench.core.errors.RenderError: nowhere/a.html cannot be written: ...
 
     """
 

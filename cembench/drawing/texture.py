@@ -1,24 +1,17 @@
-"""Textures: a checkerboard, and transfer of a texture to new texture coordinates."""
+"""The checkerboard texture of the files that are written."""
 
 from __future__ import annotations
 
 import io
 from functools import cache
-from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from scipy import ndimage
 
-from cembench.core.arrays import Real
-from cembench.core.errors import RenderError
-from cembench.drawing.rasterizer import rasterize
 from cembench.drawing.scene import DARK, LIGHT
 
 #: Side of the checkerboard in pixels, and its number of squares along a side.
 SIDE, SQUARES = 1024, 32
-#: Longest side of a baked texture, in pixels.
-LONGEST = 4096
 
 
 @cache
@@ -28,80 +21,6 @@ def checker_png() -> bytes:
     board = np.kron(squares, np.ones((SIDE // SQUARES,) * 2)).astype(np.uint8)
     picture = Image.fromarray(board, "P")
     picture.putpalette((255 * np.array([LIGHT, DARK])).round().astype(np.uint8).tobytes())
-    return _png(picture)
-
-
-def read_texture(path: Path) -> Image.Image:
-    """Read a picture as RGBA.
-
-    Raises
-    ------
-    RenderError
-        The file is missing or is not a picture.
-
-    """
-    try:
-        with Image.open(path) as picture:
-            return picture.convert("RGBA")
-    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
-        why = getattr(error, "strerror", None) or "it is not a picture in a known format"
-        raise RenderError(
-            f"the texture {path} cannot be read: {why}. Name a PNG or JPEG file."
-        ) from None
-
-
-def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
-    """Bake a texture for new texture coordinates.
-
-    Each texel of the new texture takes the colour that the old texture has at the same point of the
-    surface; texels outside the map take that of the nearest texel inside.
-
-    Parameters
-    ----------
-    texture : Image
-        The old texture.
-    old, new : float64 (m, 3, 2)
-        Texture coordinates at the triangles' corners; v points up. The old ones may lie outside the
-        unit square, where the texture repeats.
-
-    Returns
-    -------
-    bytes
-        A square PNG file whose side is the old texture's longer side (at most :data:`LONGEST`).
-
-    """
-    side = min(max(texture.size), LONGEST)
-    window = np.concatenate([2 * new - 1, np.zeros((*new.shape[:2], 1))], axis=2)
-    raster = rasterize(window.reshape(-1, 3), side)
-    place = raster.interpolate(old.reshape(-1, 2))
-    colours = np.zeros((side * side, 4))
-    colours[raster.pixel] = _bilinear(np.asarray(texture, dtype=np.float64), place)
-    missing = np.ones(side * side, dtype=bool)
-    missing[raster.pixel] = False
-    nearest = ndimage.distance_transform_edt(
-        missing.reshape(side, side), return_distances=False, return_indices=True
-    )
-    filled = colours.reshape(side, side, 4)[tuple(nearest)]
-    return _png(Image.fromarray(filled.round().astype(np.uint8), "RGBA"))
-
-
-def _bilinear(pixels: Real, place: Real) -> Real:
-    """Return the colours (k, 4) at texture coordinates (k, 2), with bilinear interpolation."""
-    height, width = pixels.shape[:2]
-    x = place[:, 0] * width - 0.5
-    y = (1 - place[:, 1]) * height - 0.5
-    column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    s, t = (x - column)[:, None], (y - row)[:, None]
-
-    def at(down: int, right: int) -> Real:
-        return pixels[(row + down) % height, (column + right) % width]
-
-    upper = (1 - s) * at(0, 0) + s * at(0, 1)
-    lower = (1 - s) * at(1, 0) + s * at(1, 1)
-    return (1 - t) * upper + t * lower
-
-
-def _png(picture: Image.Image) -> bytes:
     buffer = io.BytesIO()
     picture.save(buffer, "PNG", optimize=True)
     return buffer.getvalue()

@@ -15,7 +15,7 @@ import numpy as np
 from cembench.core.arrays import Complex, Indices, Points
 from cembench.core.errors import MeshError, describe_error
 from cembench.mesh.files import READ_WITH_UV, READERS, read_soup
-from cembench.mesh.soup import NO_UV, Soup, columns, complex_of, damaged, shown
+from cembench.mesh.soup import NO_UV, Soup, complex_of, damaged, shown
 
 #: Allowed distance of a vertex from its original position, relative to the surface's extent: single
 #: precision and six decimals are accepted.
@@ -145,54 +145,6 @@ def uv_numbers(file: Soup) -> Indices:
     return corners
 
 
-def uv_of_faces(path: Path, F: Indices) -> Points:
-    """Read the texture coordinates of an OBJ file at the corners of its triangles.
-
-    Parameters
-    ----------
-    path : Path
-        A file that was read as a surface.
-    F : int64 (m, 3)
-        The triangles of that surface: the file's polygons in order, cut into triangles.
-
-    Returns
-    -------
-    float64 (m, 3, 2)
-        As in the file; v points up.
-
-    Raises
-    ------
-    MeshError
-        The file is not OBJ, or some corners have no texture coordinates.
-
-    """
-    if path.suffix.lower() != ".obj":
-        raise MeshError(
-            f"{path}: the texture coordinates that a texture was made for are read from OBJ files "
-            "only. Convert the surface to OBJ."
-        )
-    file = read_soup(path, uv=True)
-    assert file.uv is not None
-    if len(file.triangles) != len(F):
-        raise _other_faces(path)
-    corners = file.uv_triangles
-    missing = (corners < 0) | (corners >= len(file.uv))
-    if missing.any():
-        raise MeshError(
-            f"{path}: {missing.any(axis=1).sum()} of {len(F)} triangles have no texture coordinates"
-            " (vt), so there is no texture to transfer. Name the file that the texture belongs to."
-        )
-    not_finite = np.flatnonzero(~np.isfinite(file.uv))
-    if len(not_finite):
-        raise MeshError(
-            f"{path}: texture coordinate {not_finite[0] + 1} (the first vt is 1) is not finite."
-        )
-    matches = F[:, :, None] == file.triangles[:, None, :]  # checks may have reversed a triangle
-    if not matches.any(axis=2).all():
-        raise _other_faces(path)
-    return columns(file.uv)[np.take_along_axis(corners, matches.argmax(axis=2), axis=1)]
-
-
 def _vertex_numbers(points: Points, V: Points) -> Indices:
     """Return the vertex of V that each vertex of a file is."""
     from scipy.spatial import cKDTree
@@ -251,9 +203,3 @@ _READERS: dict[str, Callable[..., Soup]] = {
     **{suffix: READERS[suffix] for suffix in (".obj", ".off", ".ply", ".mat", ".npz")},
     ".txt": _read_text,
 }
-
-
-def _other_faces(path: Path) -> MeshError:
-    return MeshError.about(
-        "{path}: its faces are not those of the surface; map it without {repair}.", path=path
-    )

@@ -13,7 +13,15 @@ from pathlib import Path
 
 from cembench.results.samples import append_line, whole_lines
 
-SOURCES = ("cembench", "algorithms", "meshes_gen", "papers", "sharing", "tests/campaign")
+SOURCES = (
+    "cembench",
+    "algorithms",
+    "meshes_gen",
+    "papers",
+    "sharing",
+    "textures",
+    "tests/campaign",
+)
 
 
 @dataclass(frozen=True)

@@ -255,7 +255,7 @@ def test_ctrl_c_in_a_command_that_keeps_nothing_says_only_that_it_stopped(cli, m
 
     from cembench.mesh.files import write_mesh
 
-    monkeypatch.setattr("cembench.api.map_surfaces.map_here", interrupted)
+    monkeypatch.setattr("cembench.textures.maps.map_here", interrupted)
     write_mesh(cli.folder / "disk.obj", flat_disk(60))
     code, _, err = cli("map", "disk.obj")
     assert code == 130

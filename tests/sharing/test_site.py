@@ -1,11 +1,14 @@
 """Several runs as a site that needs no network."""
 
+import json
 import re
+from dataclasses import asdict
 
 import pytest
 from cembench.sharing import site
 from cembench.sharing.site import about, history, write_site
 
+import cembench
 from cembench.core.errors import ParameterError, RecordError
 from cembench.report.content.evidence import Evidence
 from cembench.report.document import Report
@@ -49,19 +52,37 @@ def test_what_cannot_be_published_is_said(tmp_path):
     assert not (tmp_path / "site").exists()
 
 
-def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, monkeypatch):
+@pytest.fixture
+def reported(monkeypatch):
+    """The runs with a report, which has tests of its own."""
     shown = []
 
     def small_report(evidence, folder, command):
         shown.append(evidence.store.folder.name)
         return Report(command, command, (), ())
 
-    monkeypatch.setattr(site, "build_report", small_report)  # reports have tests of their own
+    monkeypatch.setattr(site, "build_report", small_report)
+    return shown
+
+
+def test_the_call_and_the_command_publish_the_same(cli, tmp_path, reported):
+    published(tmp_path, 1, 4.0, "hat")
+    run = tmp_path / "run-1"
+    code, out, err = cli("publish", run, "-o", tmp_path / "a", "--json")
+    assert code == 0, err
+    called = cembench.publish(run, tmp_path / "b")
+    assert json.loads(out)["runs"] == json.loads(json.dumps([asdict(one) for one in called]))
+    page = "leaderboard/index.html"
+    assert (tmp_path / "a" / page).is_file()
+    assert (tmp_path / "b" / page).is_file()
+
+
+def test_a_site_has_an_index_and_a_report_of_each_run_and_asks_nobody(tmp_path, reported):
     for number in (1, 2):
         published(tmp_path, number, 4.0, "hat")
     runs = [tmp_path / "run-2", tmp_path / "run-1"]
     result = write_site(runs, tmp_path / "site")
-    assert shown == ["run-2", "run-1"]
+    assert reported == ["run-2", "run-1"]
     assert [run.name for run in result] == ["run-1", "run-2"]
     page = (tmp_path / "site/index.html").read_text()
     links = re.findall(r'(?:href|src)="([^"]+)"', page)

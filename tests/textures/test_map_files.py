@@ -10,11 +10,11 @@ import pytest
 import pyvista
 import trimesh
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
+from cembench.textures import geometry_images
 from PIL import Image
 
 import cembench
-from cembench.api import geometry_images
-from cembench.api.write_maps import FileOptions, save_map
+from cembench.api.save_map import save_map
 from cembench.mesh.files import read_mesh, write_mesh
 from tests import gallery
 from tests.commands.test_cli import FAULTY
@@ -76,7 +76,7 @@ def test_triangles_that_rounding_folds_are_counted(tmp_path):
     z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / np.abs(mesh.V[:, :2]).max()
     inner = np.setdiff1d(np.arange(mesh.n), mesh.boundary)
     z[inner] *= 1e-12  # the disk's middle, as on a long finger
-    assert save_map(tmp_path / "a.obj", mesh, z, FileOptions("disk")) == ()
+    assert save_map(tmp_path / "a.obj", mesh, z, "disk") == ()
     (notice,) = save_map(tmp_path / "a.ply", mesh, z)
     assert notice.kind == "folded_by_rounding"
     assert "single precision" in str(notice)

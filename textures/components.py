@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.conformal.laplacian import double_areas
 from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
@@ -66,18 +64,6 @@ class Shells:
     #: Whether the file's content, with other texture coordinates, is that of the surfaces.
     as_read: bool = True
 
-    @classmethod
-    def of(cls, parts: Sequence[SurfaceFile]) -> Shells:
-        """Return surfaces of a file that differ from its content, joined to one mesh."""
-        meshes = [part.mesh for part in parts]
-        starts = np.cumsum([0, *(mesh.n for mesh in meshes)])
-        F = [mesh.F + k for mesh, k in zip(meshes, starts, strict=False)]
-        vertices = [np.arange(a, b) for a, b in pairwise(starts)]
-        faces = [np.arange(a, b) for a, b in pairwise(np.cumsum([0, *map(len, F)]))]
-        V, joined = np.concatenate([mesh.V for mesh in meshes]), np.concatenate(F)
-        places = tuple(vertices), tuple(faces)
-        return cls(parts[0].path, V, joined, tuple(parts), *places, as_read=False)
-
     def joined(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
         """Return the images of all surfaces as one array, per corner where surfaces were cut.
 
@@ -99,11 +85,6 @@ class Shells:
             size += len(copies[-1])
         is_cut = any(part.cut for part in self.parts)
         return np.concatenate([uv, *copies]), corners if is_cut else None
-
-
-def areas_of(surfaces: Sequence[SurfaceFile]) -> list[float]:
-    """Return the area of each surface, twice."""
-    return [float(double_areas(one.mesh.V, one.mesh.F).sum()) for one in surfaces]
 
 
 def read_shells(
@@ -151,13 +132,13 @@ def read_shells(
                 "{each} writes each to a file of its own.",
                 **{"path": path, "count": len(pieces), "most": MOST, "each": each},
             ) from None
-    F = soup.triangles
-    parts, vertices, faces = [], [], []
+    parts = []
     for k, (own, held) in enumerate(pieces):
         number = np.full(len(soup.V), -1)
         number[own] = np.arange(len(own))
         name = f"{soup.name} {k + 1}"
-        shell = Soup.of_triangles(soup.V[own], number[F[held]], name=name, notices=soup.notices)
+        F = number[soup.triangles[held]]
+        shell = Soup.of_triangles(soup.V[own], F, name=name, notices=soup.notices)
         try:
             parts.append(prepared(shell, kinds, path, cut=cut))
         except MeshError as error:
@@ -169,9 +150,8 @@ def read_shells(
                 more = error.options, error.notices
                 raise UnusableMeshError(error.problems, error.path, where, *more) from None
             raise MeshError(f"{where}: {error}") from None
-        vertices.append(own)
-        faces.append(held)
-    return Shells(path, soup.V, F, tuple(parts), tuple(vertices), tuple(faces))
+    vertices, faces = zip(*pieces, strict=True)
+    return Shells(path, soup.V, soup.triangles, tuple(parts), vertices, faces)
 
 
 def _alone(file: SurfaceFile, soup: Soup | None = None) -> Shells:
@@ -186,12 +166,13 @@ def _alone(file: SurfaceFile, soup: Soup | None = None) -> Shells:
 
 def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
     """Return the vertices and triangles of each surface."""
-    F = soup.triangles
+    F, used = soup.triangles, np.unique(soup.triangles)
     label = components(F, len(soup.V))[1]
-    of_faces, of_vertices = label[F[:, 0]], label[np.unique(F)]
-    faces, vertices = np.argsort(of_faces, kind="stable"), np.argsort(of_vertices, kind="stable")
-    parts = [
-        np.split(order, np.cumsum(np.unique(of, return_counts=True)[1])[:-1])
-        for of, order in ((of_vertices, vertices), (of_faces, faces))
-    ]
-    return [(np.unique(F)[own], held) for own, held in zip(*parts, strict=True)]
+    vertices, faces = (_grouped(of) for of in (label[used], label[F[:, 0]]))
+    return [(used[own], held) for own, held in zip(vertices, faces, strict=True)]
+
+
+def _grouped(labels: Ints) -> list[Ints]:
+    """Return the places of each label, by label."""
+    ends = np.cumsum(np.unique(labels, return_counts=True)[1])
+    return np.split(np.argsort(labels, kind="stable"), ends[:-1])

@@ -6,22 +6,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from cembench.api.components import Shells
-from cembench.api.map_outputs import draw_maps, write_extras
-from cembench.api.write_maps import FileOptions, world_scale, write_shells, write_together
+from cembench.api.parameterize import Result
+from cembench.api.save_map import world_scale
 from cembench.conformal.atlas import laid_out
 from cembench.core.arrays import Complex
-from cembench.core.errors import AlgorithmFailed
+from cembench.core.errors import AlgorithmFailed, ParameterError
 from cembench.core.notices import Notice
 from cembench.core.reporter import SILENT, Reporter
-from cembench.mesh import datasets
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.registry import Registry
 from cembench.results.records import Record
 from cembench.running.in_this_process import map_here, may_run_here, overlay_here
 from cembench.running.options import Options
 from cembench.running.plan import Task
-from cembench.running.surfaces import SurfaceFile, file_named, is_generated
+from cembench.running.surfaces import SurfaceFile
+
+from .components import Shells
+from .writing import FileOptions, draw_maps, write_extras, write_shells, write_together
 
 #: Notices, each with the file it is about.
 Notices = tuple[tuple[Path, Notice], ...]
@@ -72,33 +72,6 @@ class Mapped:
     def ok(self) -> bool:
         """Whether the map is valid."""
         return self.record.outcome.status == "ok"
-
-
-def local_files(
-    meshes: Sequence[Path], registry: Registry, reporter: Reporter = SILENT
-) -> list[Path]:
-    """Return the file of each path or name of a public surface, which is fetched if necessary.
-
-    A generated surface keeps its name.
-
-    Raises
-    ------
-    MeshError
-        A name is that of no surface.
-
-    """
-    known = [path for path in meshes if not path.exists() and str(path) in registry.datasets]
-    fetched = {}
-    for path in known:
-        dataset = registry.dataset(str(path))
-        with reporter.downloads([dataset]) as progress:
-            datasets.fetch(dataset, progress=progress(dataset))
-        fetched[path] = datasets.surface_file(dataset)
-    return [
-        fetched.get(path)
-        or (path if is_generated(str(path), registry) else file_named(path, registry))
-        for path in meshes
-    ]
 
 
 @dataclass
@@ -163,15 +136,16 @@ class Maps:
 
     def _write(self, file: FileJobs, own: Sequence[Mapped]) -> Notices:
         notices: tuple[Notice, ...] = ()
-        maps = self._maps(own, file.output)
-        shells = Shells.of([m.surface for m in own]) if self.overlay else file.shells
-        if maps and file.output is not None:
-            atlas = own[0].record.target == "atlas"
-            notices = write_shells(file.output, shells, maps, self.file_options, atlas=atlas)
+        maps, options, record = self._maps(own, file.output), self.file_options, own[0].record
+        surfaces = [mapped.surface for mapped in own]
+        if maps and file.output is not None and self.overlay:
+            notices = write_together(file.output, surfaces, maps, options)
+        elif maps and file.output is not None:
+            is_atlas = record.target == "atlas"
+            notices = write_shells(file.output, file.shells, maps, options, atlas=is_atlas)
         if maps and file.picture is not None:
             with self.reporter.busy("drawing"):
-                equal = self.file_options.equal
-                draw_maps(shells, maps, file.picture, own[0].record, equal=equal)
+                draw_maps(surfaces, maps, file.picture, record, options)
         return tuple((file.output or file.shells.path, notice) for notice in notices)
 
     def _mapped(self, file: FileJobs, surface: SurfaceFile, task: Task) -> Mapped:
@@ -186,17 +160,23 @@ class Maps:
                 record, uv = map_once(task, self.options)
             else:
                 record, uv = map_here(task)
-        proof = _certificate(mesh, uv, record) if self.certificate and uv is not None else ""
-        mapped = Mapped(surface, record, uv, {}, certificate=proof, overlay=words)
-        if uv is None or not self.writes(mapped):
+        mapped = Mapped(surface, record, uv, {}, overlay=words)
+        if uv is None:
+            return mapped
+        result = Result(mesh, algorithm, uv, record.outcome)
+        if self.certificate:
+            mapped = replace(mapped, certificate=_certificate(result))
+        if not self.writes(mapped):
             return mapped
         noticed: Notices = ()
         extras = self.file_options.extras
         files = {"output": file.output, **extras, "preview": file.picture}
         if extras:
             with self.reporter.busy("writing"):
-                shown = laid_out(mesh, uv) if record.target == "atlas" else (mesh, uv)
-                notices = write_extras(self.file_options, *shown, record)
+                if record.target == "atlas":
+                    mesh, uv = laid_out(mesh, uv)
+                    result = Result(mesh, algorithm, uv, record.outcome)
+                notices = write_extras(self.file_options, result)
             noticed = tuple((extras.get("remeshed", surface.path), one) for one in notices)
         written = {kind: str(path) for kind, path in files.items() if path is not None}
         scale = None
@@ -213,14 +193,12 @@ def _overlay(fine: TriangleMesh, coarse: TriangleMesh) -> str:
     )
 
 
-def _certificate(mesh: TriangleMesh, uv: Complex, record: Record) -> str:
+def _certificate(result: Result) -> str:
     """Return what the bounds of the surface's modulus say of a map."""
-    from cembench.conformal.certificate import certificate_of
-
     try:
-        certificate = certificate_of(mesh, uv, record.target)
-        if certificate is None:
-            return "only for maps to the disk, with circular holes or without"
-        return certificate.words(uv[certificate.corners])
+        proof = result.certificate()
+        return proof.words(result.z[proof.corners])
+    except ParameterError:
+        return "only for maps to the disk, with circular holes or without"
     except AlgorithmFailed as error:
         return f"none: {error}"

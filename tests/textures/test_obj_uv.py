@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
+from cembench.textures.bake import uv_of_faces
 
 from cembench import MeshError
-from cembench.mesh.uvs import uv_of_faces
 
 POINTS = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 TEXTURE = "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvt .5\n"

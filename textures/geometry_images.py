@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cembench.conformal.resample import geometry_image
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Real
 from cembench.core.atomic import write_by, write_bytes
 from cembench.core.errors import ParameterError, RenderError
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -20,24 +19,21 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 IMAGES = (".npy", ".exr", ".png")
 
 
-def write_geometry_image(path: Path, mesh: TriangleMesh, z: Complex, side: int) -> None:
-    """Sample a surface through its map and write the samples.
+def write_geometry_image(path: Path, mesh: TriangleMesh, samples: Real) -> None:
+    """Write the samples of a surface.
 
-    A map onto the disk is sampled on the square, any other map in place. NPY and EXR hold
-    coordinates, NaN off the surface. PNG has 16 bits per channel, with the surface's bounding box
-    scaled to 0 ... 1, and is transparent off the surface.
+    NPY and EXR hold coordinates, NaN off the surface. PNG has 16 bits per channel, with the
+    surface's bounding box scaled to 0 ... 1, and is transparent off the surface.
 
     Raises
     ------
     ParameterError
-        The format is unknown, or `side` is out of range.
+        The format is unknown.
     RenderError
         The file cannot be written, or OpenEXR is not installed.
 
     """
     check_image_format(path)
-    onto_disk = len(mesh.loops) == 1 and np.abs(np.abs(z[mesh.loops[0]]) - 1).max() < 1e-9
-    samples = geometry_image(mesh, z, side, "square" if onto_disk else "disk")
     if path.suffix.lower() == ".exr":
         _write_exr(path, samples)
         return

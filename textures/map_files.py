@@ -3,57 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from cembench.api.settings import (
     AnyPath,
     Backend,
+    MapTarget,
     Placement,
     Solves,
     Threads,
     Timeout,
+    algorithms_named,
     bytes_of,
     installed_backend,
     registry_with,
 )
 from cembench.core.arguments import Range, checked
-from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
 
 if TYPE_CHECKING:
-    from cembench.api.map_surfaces import Maps
+    from .maps import Maps
 
-#: What a map is for: the plane for textures, the disk for comparisons and registration.
-MapTarget = Literal["plane", "disk", "circular holes"]
-#: The recommended algorithms by target; the first that takes the surface is used.
-RECOMMENDED: Mapping[MapTarget, tuple[str, ...]] = {
-    "plane": ("plane", "plane-holes"),
-    "disk": ("direct-cem", "direct-cem-holes"),
-    "circular holes": ("direct-cem-holes",),
-}
-#: Names that stand for one algorithm on disks and another on surfaces with holes.
-_SEVERAL = {"best": ("best", "best-holes"), "plane": RECOMMENDED["plane"]}
-
-
-def algorithms_named(name: str | None, target: MapTarget | None) -> tuple[str, ...]:
-    """Return the algorithms that a name or a target stands for; the first that takes a surface
-    maps it.
-
-    Raises
-    ------
-    ParameterError
-        Both are given, or the target is unknown.
-
-    """
-    if target is not None and target not in RECOMMENDED:
-        allowed = ", ".join(map(repr, RECOMMENDED))
-        raise ParameterError(f"target={target!r} is unknown; allowed: {allowed}.")
-    if name is not None and target is not None:
-        raise ParameterError(
-            f"algorithm={name!r} and target={target!r} exclude each other: an algorithm has one "
-            "target. Give only one of them."
-        )
-    return RECOMMENDED[target or "plane"] if name is None else _SEVERAL.get(name, (name,))
+__all__ = ["map_files"]
 
 
 @checked
@@ -192,25 +163,24 @@ def map_files(
     (True, 'flat_uv.obj')
 
     """
-    from dataclasses import replace
     from os import PathLike
     from pathlib import Path
 
-    from cembench.api.components import read_shells
-    from cembench.api.map_outputs import (
-        check_options,
-        check_overlay_options,
-        check_shells,
-        check_square,
-        check_takes_disks,
-        output_files,
-        picture_files,
-    )
-    from cembench.api.map_surfaces import FileJobs, Maps, local_files
-    from cembench.api.write_maps import FileOptions, beside
+    from cembench.api.fetch import local_files
     from cembench.core.overwriting import refuse_inputs, refuse_present, refuse_twice
     from cembench.running.options import Options
     from cembench.running.plan import MeasurementSettings, Task, plan_cells, provenance_of
+
+    from .components import read_shells
+    from .maps import FileJobs, Maps
+    from .outputs import (
+        check_algorithms,
+        check_options,
+        check_shells,
+        output_files,
+        picture_file,
+    )
+    from .writing import FileOptions
 
     def path_of(path: AnyPath | None) -> Path | None:
         return None if path is None else Path(path)
@@ -223,12 +193,6 @@ def map_files(
         target = "disk"
     candidates = [registry.algorithm(name) for name in algorithms_named(algorithm, target)]
     apart = timeout != Options.timeout or memory_bytes is not None
-    if overlay:
-        check_overlay_options(
-            candidates, cut=cut, bake=bake is not None, apart=apart, threads=threads
-        )
-    if cut:
-        check_takes_disks(candidates)
     if isinstance(meshes, str | PathLike):
         meshes = [meshes]
     paths, named_output = [Path(mesh) for mesh in meshes], path_of(output)
@@ -236,18 +200,17 @@ def map_files(
     named = {"geometry_image": geometry_image, "remeshed": remesh, "flat": flat, "html": html}
     extras = {what: Path(path) for what, path in named.items() if path is not None}
     file_options = FileOptions(uv, checker, path_of(bake), equal_parts, side, extras)
+    check_algorithms(
+        *(candidates, file_options),
+        surfaces=len(paths),
+        cut=cut,
+        overlay=overlay,
+        limited=apart or threads > 1,
+    )
     check_options(paths, outputs, file_options)
-    check_square(candidates, uv)
-    is_atlas = any(a.target == "atlas" for a in candidates)
-    if is_atlas and (file_options.extras.keys() - {"html"} or bake or len(paths) > 1):
-        raise ParameterError.about(
-            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
-            "{flat} and {bake}, which need one UV per vertex.",
-            name=candidates[0].name,
-        )
     sources = local_files(paths, registry, reporter)
     written = list(dict.fromkeys(path for path in outputs if path is not None))
-    others = [path for file in written for path in beside(file, file_options)]
+    others = [path for file in written for path in file_options.beside(file)]
     inputs = [*sources, *([file_options.bake] if file_options.bake else [])]
     all_files = [*written, *others, *file_options.extras.values()]
     refuse_twice(all_files, "files", "Name another path for one of them.")
@@ -265,12 +228,16 @@ def map_files(
             taken = next(a for a in candidates if isinstance(mesh, a.mesh_type))
             role = {mesh.name: provenance_of(registry, mesh)}
             tasks += plan_cells([taken], [mesh], parameters or {}, settings, plugins, role)
-        files.append(FileJobs(shells, tuple(tasks), None if together else place))
-    if preview:
-        chosen = [file.tasks[0].algorithm for file in files]
-        pictures = picture_files(sources, chosen, [f.output for f in files], overwrite=overwrite)
-        refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")
-        files = [replace(file, picture=p) for file, p in zip(files, pictures, strict=True)]
+        to = None if together else place
+        picture = picture_file(source, tasks[0].algorithm, to) if preview else None
+        files.append(FileJobs(shells, tuple(tasks), to, picture))
+    pictures = [file.picture for file in files if file.picture is not None]
+    refuse_twice(pictures, "pictures", "Draw them one at a time.")
+    refuse_twice([*all_files, *pictures], "files", "Name another path for one of them.")
+    for picture in pictures if not overwrite else ():
+        from cembench.drawing.replaceable_pictures import check_replaceable
+
+        check_replaceable(picture)
     for folder in {path.parent for path in written}:
         folder.mkdir(exist_ok=True)
     return Maps(
@@ -280,3 +247,8 @@ def map_files(
         overlay=overlay,
         apart=apart,
     )
+
+
+def add_command() -> None:
+    """Add the command of this verb."""
+    from . import map_command  # noqa: F401 - it registers itself

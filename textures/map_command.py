@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from cembench.api.map_files import map_files
 from cembench.commands.app import app
 from cembench.commands.console import (
     SHOWN,
@@ -22,8 +21,10 @@ from cembench.commands.from_api import Call, from_api
 from cembench.core.errors import ParameterError
 from cembench.core.notices import NoticeKind
 
+from .map_files import map_files
+
 if TYPE_CHECKING:
-    from cembench.api.map_surfaces import Mapped, Maps
+    from .maps import Mapped, Maps
 
 
 @app.command(
@@ -97,10 +98,9 @@ def _failure(mapped: Mapped, *, named: bool) -> str:
 
 def _more_of(mapped: Mapped) -> dict[str, Any]:
     repaired = mapped.surface.repaired
-    proof = {"certificate": mapped.certificate} if mapped.certificate else {}
-    refined = {"overlay": mapped.overlay} if mapped.overlay else {}
-    scale = {} if mapped.uv_scale is None else {"uv_scale": mapped.uv_scale}
-    return proof | refined | scale | ({"repair": repaired.counts} if repaired else {})
+    more = {name: getattr(mapped, name) for name in ("certificate", "overlay", "uv_scale")}
+    more["repair"] = repaired and repaired.counts
+    return {name: what for name, what in more.items() if what not in ("", None)}
 
 
 def _show_all(mapped: Mapped, output: bool, *, verbose: bool, keep_invalid: bool) -> None:

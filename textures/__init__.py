@@ -1,0 +1,1 @@
+"""Files in, files with UVs out: several surfaces side by side, textures, geometry images."""
