@@ -27,7 +27,6 @@ from cembench.api.settings import (
 from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
-from cembench.core.wording import Advice
 from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
@@ -451,25 +450,25 @@ def benchmark(
     check_cluster(cluster, pairing, reporter)
     fixed, chosen_budget = rounds is not None, budget not in ("auto", None)
     excluding = {
-        "{same_environment} is of {cluster}: name one, or leave it out.": (
+        "`same_environment` is of `cluster`: name one, or leave it out.": (
             same_environment and cluster is None
         ),
-        "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of them.": (
+        "`rounds` fixes the number of rounds, and `precision` chooses it: give only one of them.": (
             fixed and precision is not None
         ),
-        "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one of "
-        "them. {precision} and {max_rounds} choose the rounds within a budget.": (
+        "`rounds` fixes the number of rounds, which `budget` does not shorten: give only one of "
+        "them. `precision` and `max_rounds` choose the rounds within a budget.": (
             fixed and chosen_budget
         ),
-        "{rounds} fixes the number of rounds, which {max_rounds} limits for {precision}: give only "
+        "`rounds` fixes the number of rounds, which `max_rounds` limits for `precision`: give only "
         "one of them.": fixed and max_rounds != USUAL_MOST_ROUNDS,
-        "{limit} needs {sets}: add one, or leave {limit} out.": limit is not None and not sets,
-        "{repair} works with single files and with {mesh_dir}: repair the files of a set one by "
+        "`limit` needs `sets`: add one, or leave `limit` out.": limit is not None and not sets,
+        "`repair` works with single files and with `mesh_dir`: repair the files of a set one by "
         "one, or leave it out.": repair and bool(sets),
     }
     for text, is_so in excluding.items():
         if is_so:
-            raise ParameterError.about(text)
+            raise ParameterError(text)
     if sets and rounds is None and precision is None:
         rounds = 1
     share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)
@@ -496,13 +495,9 @@ def benchmark(
     of_profile = surfaces_of(models, registry) if models else []
     named += of_profile
     if not named and not mesh_dir and not sets:
-        raise ParameterError.about(
-            "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
-            "{sets}; {listed} have names.",
-            listed=Advice(
-                "`cembench.list_surfaces()` and `cembench.fetch()`",
-                "`cembench list surfaces` and `cembench fetch`",
-            ),
+        raise ParameterError(
+            "there is no surface to measure on; give at least one, or a `profile`, `mesh_dir` or "
+            "`sets`; `cembench list surfaces` and `cembench fetch` have names."
         )
     kept = [name for name in of_profile if registry.surface(name).kept]
     new = [name for name in kept if not is_kept(registry.surface(name))]

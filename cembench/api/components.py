@@ -145,11 +145,10 @@ def read_shells(
         ):
             raise
         if len(pieces) > MOST:
-            each = repair_advice(path, {"components": "all"})
-            raise MeshError.about(
-                "{path} holds {count:,} surfaces; up to {most:,} of a file are mapped at once. "
-                "{each} writes each to a file of its own.",
-                **{"path": path, "count": len(pieces), "most": MOST, "each": each},
+            raise MeshError(
+                f"{path} holds {len(pieces):,} surfaces; up to {MOST:,} of a file are mapped at "
+                f"once. {repair_advice(path, {'components': 'all'})} writes each to a file of its "
+                "own."
             ) from None
     F = soup.triangles
     parts, vertices, faces = [], [], []

@@ -240,10 +240,9 @@ def map_files(
     check_square(candidates, uv)
     is_atlas = any(a.target == "atlas" for a in candidates)
     if is_atlas and (file_options.extras.keys() - {"html"} or bake or len(paths) > 1):
-        raise ParameterError.about(
-            "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
-            "{flat} and {bake}, which need one UV per vertex.",
-            name=candidates[0].name,
+        raise ParameterError(
+            f"{candidates[0].name} makes an atlas: map one surface at a time, without "
+            "`geometry_image`, `remesh`, `flat` and `bake`, which need one UV per vertex."
         )
     sources = local_files(paths, registry, reporter)
     written = list(dict.fromkeys(path for path in outputs if path is not None))

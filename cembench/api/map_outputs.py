@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -18,7 +17,7 @@ from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice
 from cembench.core.overwriting import refuse_twice
-from cembench.core.wording import Advice
+from cembench.mesh.defects import repair_advice
 from cembench.mesh.files import check_writable_format, write_mesh
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.mesh.unit_square import packed
@@ -58,22 +57,22 @@ def check_options(
 ) -> None:
     """Raise the errors of textures and extra files before anything is mapped."""
     if options.checker and options.bake:
-        raise ParameterError.about("{checker} and {bake} each give a texture; choose one.")
+        raise ParameterError("`checker` and `bake` each give a texture; choose one.")
     if options.bake and len(meshes) > 1:
-        raise ParameterError.about("{bake} works with one surface; map them one by one.")
+        raise ParameterError("`bake` works with one surface; map them one by one.")
     if options.bake:
         from cembench.drawing.texture import read_texture
 
         read_texture(options.bake)
     if options.textured and None in outputs:
-        raise ParameterError.about(
-            "{checker} and {bake} need a file that uses the texture: add {output}."
+        raise ParameterError(
+            "`checker` and `bake` need a file that uses the texture: add `output`."
         )
     if len(set(outputs)) < len(outputs) and outputs[0] and options.place != "unit":
-        raise ParameterError.about("surfaces in one file share the unit square: leave out {uv}.")
+        raise ParameterError("surfaces in one file share the unit square: leave out `uv`.")
     if options.extras and len(meshes) > 1:
-        raise ParameterError.about(
-            "{geometry_image}, {remesh}, {flat} and {html} take one surface; map them one by one."
+        raise ParameterError(
+            "`geometry_image`, `remesh`, `flat` and `html` take one surface; map them one by one."
         )
     for what, path in options.extras.items():
         if what == "geometry_image":
@@ -83,54 +82,39 @@ def check_options(
         elif what in ("remeshed", "flat"):
             check_writable_format(path, with_uv=what == "remeshed")
         elif path.suffix.lower() not in (".html", ".htm"):
-            raise ParameterError.about(
-                "{page}: {html} writes a web page; use the suffix .html.", page=path
-            )
+            raise ParameterError(f"{path}: `html` writes a web page; use the suffix .html.")
         elif not path.parent.is_dir():
             raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
     """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
-    each = Advice(
-        f"`cembench.repair({str(path)!r}, components='all').meshes`",
-        f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
-    )
-    holds = {"path": path, "surfaces": surfaces, "each": each}
+    holds = f"{path} holds {surfaces} surfaces"
     if surfaces > 1 and options.extras:
-        raise ParameterError.about(
-            "{path} holds {surfaces} surfaces; {geometry_image}, {remesh}, {flat} and {html} take "
-            "one. "
-            "{each} gives each alone.",
-            **holds,
+        raise ParameterError(
+            f"{holds}; `geometry_image`, `remesh`, `flat` and `html` take one. "
+            f"{repair_advice(path, {'components': 'all'})} gives each alone."
         )
     if surfaces > 1 and options.place != "unit":
-        raise ParameterError.about(
-            "{path} holds {surfaces} surfaces, which share the unit square: leave out {uv}.",
-            **holds,
-        )
+        raise ParameterError(f"{holds}, which share the unit square: leave out `uv`.")
 
 
 def check_square(candidates: Sequence[Algorithm], place: Placement) -> None:
     """Raise :class:`ParameterError` if a map that is no disk should fill the square."""
     other = next((a for a in candidates if a.target not in ON_THE_CIRCLE), None)
     if place == "square" and other is not None:
-        raise ParameterError.about(
-            "{uv:'square'} needs a map onto the disk, and {name} maps to another target "
-            "({target}): take {algorithm:'direct-cem'}.",
-            name=other.name,
-            target=other.target,
+        raise ParameterError(
+            f"uv='square' needs a map onto the disk, and {other.name} maps to another target "
+            f"({other.target}): take algorithm='direct-cem'."
         )
 
 
 def check_takes_disks(candidates: Sequence[Algorithm]) -> None:
     """Raise :class:`ParameterError` if no algorithm takes the disk that a cut makes."""
     if not any(issubclass(DiskMesh, algorithm.mesh_type) for algorithm in candidates):
-        raise ParameterError.about(
-            "{cut} makes a disk, which {name} does not take; name an algorithm for disks (see "
-            "{listed}).",
-            name=candidates[0].name,
-            listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
+        raise ParameterError(
+            f"`cut` makes a disk, which {candidates[0].name} does not take; name an algorithm for "
+            "disks (see `cembench list algorithms`)."
         )
 
 
@@ -140,20 +124,19 @@ def check_overlay_options(
     """Raise :class:`ParameterError` for what a map on a refined mesh does not go with."""
     refinement_of(candidates[0])
     if cut:
-        raise ParameterError.about(
-            "{overlay} refines both banks of a cut in different places, so the surface cannot be "
-            "written uncut: leave out {cut}, and map what {command} writes.",
-            command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
+        raise ParameterError(
+            "`overlay` refines both banks of a cut in different places, so the surface cannot be "
+            "written uncut: leave out `cut`, and map what `cembench cut MESH -o CUT.obj` writes."
         )
     if bake:
-        raise ParameterError.about(
-            "{overlay} makes triangles that the texture's own UVs do not know: leave out {bake}, "
-            "and use {checker}."
+        raise ParameterError(
+            "`overlay` makes triangles that the texture's own UVs do not know: leave out `bake`, "
+            "and use `checker`."
         )
     if apart or threads > 1:
-        raise ParameterError.about(
-            "{overlay} maps in this process, with one thread and no limits: leave out {timeout}, "
-            "{memory_bytes} and {threads}."
+        raise ParameterError(
+            "`overlay` maps in this process, with one thread and no limits: leave out `timeout`, "
+            "`memory_bytes` and `threads`."
         )
 
 
@@ -208,10 +191,9 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
         check_writable_format(output, with_uv=True)
         return [output] * len(meshes)
     if output.is_file():
-        raise ParameterError.about(
-            "{path} is a file, but there are {count} surfaces; name a folder with {output}.",
-            path=output,
-            count=len(meshes),
+        raise ParameterError(
+            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with "
+            "`output`."
         )
     if not output.parent.is_dir():
         raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")

@@ -14,7 +14,6 @@ from cembench.api.sets import Gathered, gathered, surfaces_of_set
 from cembench.api.surface_collections import Provided
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.reporter import Reporter
-from cembench.core.wording import Advice, Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import Record
@@ -136,8 +135,8 @@ def check_cluster(cluster: Client | str | None, pairing: str, reporter: Reporter
     if cluster is None:
         return
     if pairing == "process":
-        raise ParameterError.about(
-            "{pairing:'process'} is for runs on this machine; leave it out, or leave {cluster} out."
+        raise ParameterError(
+            "pairing='process' is for runs on this machine; leave it out, or leave `cluster` out."
         )
     from cembench.running.cluster.connect import parse_cluster
 
@@ -167,11 +166,9 @@ def part_of(tasks: Sequence[Task], part: str) -> list[Task]:
     number, count = map(int, part.split("/")) if re.fullmatch(r"\d+/\d+", part) else (0, 0)
     groups = sorted(comparable_groups(tasks), key=lambda group: -group[0].facts.faces)
     if not 1 <= number <= min(count, len(groups)):
-        raise ParameterError.about(
-            "{given} is not allowed; write 3/20 for the third of twenty parts. This plan can have "
-            "up to {most}, since a surface under a policy is measured as a whole.",
-            given=Setting("part", repr(part)),
-            most=len(groups),
+        raise ParameterError(
+            f"part={part!r} is not allowed; write 3/20 for the third of twenty parts. This plan "
+            f"can have up to {len(groups)}, since a surface under a policy is measured as a whole."
         )
     chosen = {task.cell.label for group in groups[number - 1 :: count] for task in group}
     return [task for task in tasks if task.cell.label in chosen]
@@ -263,11 +260,9 @@ def gather_sets(
     if more > 0:
         reporter.note(f"{more} more are left out; the report lists them")
     if not surfaces.surfaces:
-        raise ParameterError.about(
-            "no surface in {given} is accepted by the chosen algorithms; "
-            "{fetch} shows whether files can be fetched.",
-            fetch=Advice("`cembench.fetch(group=['disks'])`", "`cembench fetch --group disks`"),
-            given=", ".join(sets),
+        raise ParameterError(
+            f"no surface in {', '.join(sets)} is accepted by the chosen algorithms; `cembench "
+            "fetch --group disks` shows whether files can be fetched."
         )
     return surfaces
 
@@ -291,10 +286,8 @@ def check_reference(reference: str | None, chosen: Sequence[Algorithm]) -> None:
     """Raise :class:`ParameterError` if the reference is not one of the algorithms."""
     names = [algorithm.name for algorithm in chosen]
     if reference is not None and reference not in names:
-        raise ParameterError.about(
-            "{given} is not among the algorithms of this run: {names}.",
-            given=Setting("reference", repr(reference)),
-            names=", ".join(names),
+        raise ParameterError(
+            f"reference={reference!r} is not among the algorithms of this run: {', '.join(names)}."
         )
 
 

@@ -18,7 +18,6 @@ from cembench.core.arrays import Complex, Indices
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError, RenderError
 from cembench.core.notices import Notice, NoticeKind
-from cembench.core.wording import Advice
 from cembench.mesh.files import SINGLE, write_soup
 from cembench.mesh.formats import gltf, obj
 from cembench.mesh.soup import Soup, Texture, columns
@@ -69,11 +68,9 @@ def beside(output: Path, file_options: FileOptions) -> list[Path]:
         return [texture, output.with_suffix(".mtl")]
     if suffix == ".ply":
         return [texture]
-    raise ParameterError.about(
-        "{output_file}: {suffix} files cannot refer to a texture; use {checker} and {bake} with "
-        ".glb, .obj or .ply.",
-        output_file=output,
-        suffix=suffix,
+    raise ParameterError(
+        f"{output}: {suffix} files cannot refer to a texture; use `checker` and `bake` with .glb, "
+        ".obj or .ply."
     )
 
 
@@ -155,9 +152,9 @@ def placed(z: Complex, place: Placement, surface: TriangleMesh, F: Indices) -> C
         return z * world_scale(z, surface, F)
     if place == "square":
         if np.abs(np.abs(z).max() - 1) > 1e-9:
-            raise ParameterError.about(
-                "{uv:'square'} needs a map onto the disk, which then fills the square: take "
-                "{algorithm:'direct-cem'}."
+            raise ParameterError(
+                "uv='square' needs a map onto the disk, which then fills the square: take "
+                "algorithm='direct-cem'."
             )
         return (disk_to_square(z) + (1 + 1j)) / 2
     return z
@@ -235,10 +232,10 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells | No
     from cembench.drawing.texture import baked_png, read_texture
 
     if source is None or not source.as_read:
-        raise ParameterError.about(
-            "{bake} needs the faces of the original file, but the surface was repaired, or is not "
-            "of a file; {repair} shows what it changes. Fix the file so that it keeps its UVs.",
-            repair=Advice("`cembench.repair(surface).steps`", "`cembench repair`"),
+        raise ParameterError(
+            "`bake` needs the faces of the original file, but the surface was repaired, or is not "
+            "of a file; `cembench repair` shows what it changes. Fix the file so that it keeps "
+            "its UVs."
         )
     old = uv_of_faces(source.path, soup.triangles)
     assert soup.uv is not None

@@ -11,6 +11,7 @@ from cembench.api.cut import cut as cut_surface
 from cembench.commands.app import app
 from cembench.commands.console import Json, err, note, out, print_json
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Force
 from cembench.commands.repair import print_steps
 from cembench.core.errors import MeshError
 
@@ -49,9 +50,7 @@ def cut(
     mend: Annotated[
         bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
     ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv.")
-    ] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the disk and its seam, and print the length of the cut."""

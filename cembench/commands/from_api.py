@@ -24,7 +24,6 @@ from typer.models import ArgumentInfo
 
 from cembench.commands.console import assignments, hushed, split
 from cembench.core.arguments import Argument, arguments_of, summary_of
-from cembench.core.errors import CembenchError
 from cembench.core.names import did_you_mean
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
@@ -42,8 +41,6 @@ USUAL = {
 }
 #: Arguments that may be names or paths.
 PATHS = ("plugins", "sets")
-#: The options that messages name.
-NAMES = {name: spelling.split()[0] for name, spelling in USUAL.items()}
 NONE: Mapping[str, Any] = MappingProxyType({})
 #: What the values of options are called in the help.
 _METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
@@ -106,20 +103,12 @@ def from_api(
         for name, argument in arguments.items():
             named = positional[name].kind is _KEYWORD or name in names
             kind, default = _option_of(argument, spelled.get(name, ""), words, named=named)
-            if not named:
-                names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
         def command(**rest: Any) -> None:
-            try:
-                taken = {
-                    name: _value(argument, rest.pop(name)) for name, argument in arguments.items()
-                }
-                with hushed(rest.pop("quiet")):
-                    body(partial(function, **taken), **rest)
-            except CembenchError as error:
-                error.reword(NAMES | names)
-                raise
+            taken = {name: _value(argument, rest.pop(name)) for name, argument in arguments.items()}
+            with hushed(rest.pop("quiet")):
+                body(partial(function, **taken), **rest)
 
         more = [p.replace(kind=_KEYWORD) for p in [*own.values()][1:]]
         quiet = inspect.Parameter("quiet", _KEYWORD, default=False, annotation=_QUIET)
@@ -196,7 +185,8 @@ def _option_of(
     if is_list and default is not inspect.Parameter.empty:
         default = list(default or ())
     whole = list[kind] if is_list else kind if default is not None else kind | None  # type: ignore[valid-type]
-    info = typer.Option(*(flags or [_option(argument.name)]), **more)
+    # Messages call an argument by its name, so that is always one of its options.
+    info = typer.Option(*dict.fromkeys([*flags, _option(argument.name)]), **more)
     return Annotated[whole, info if named else typer.Argument(**more)], default
 
 

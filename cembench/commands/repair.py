@@ -12,6 +12,7 @@ from cembench.api.repair import repair as repair_surface
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, note, out, print_json
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Force
 
 #: What the tables beside an output number, and the heading of its column.
 _NUMBERED = {"vertices": "vertex", "faces": "triangle"}
@@ -42,10 +43,7 @@ def repair(
             "each vertex and triangle had.",
         ),
     ],
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Overwrite the input, or existing files OUT_1, ..., *.csv"),
-    ] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the repaired surfaces, and print what was done."""

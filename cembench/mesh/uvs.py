@@ -259,6 +259,4 @@ _READERS: dict[str, Callable[..., Soup]] = {
 
 
 def _other_faces(path: Path) -> MeshError:
-    return MeshError.about(
-        "{path}: its faces are not those of the surface; map it without {repair}.", path=path
-    )
+    return MeshError(f"{path}: its faces are not those of the surface; map it without `repair`.")

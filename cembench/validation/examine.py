@@ -11,7 +11,6 @@ from typing import Any
 
 from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
-from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Outcome, Record
@@ -104,8 +103,8 @@ def examine(
             "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
         )
     if asked.checks_only and asked.require:
-        raise ParameterError.about(
-            "{require} needs the stages that {checks_only} leaves out; leave one of them out."
+        raise ParameterError(
+            "`require` needs the stages that `checks_only` leaves out; leave one of them out."
         )
     if asked.up_to:
         sizes(asked.up_to)  # fail now, not after the timing
@@ -301,12 +300,8 @@ def baselines(
     for name in asked:
         if not fits(algorithm, registry.algorithm(name)):
             fitting = [one.name for one in registry.algorithms.values() if fits(algorithm, one)]
-            raise ParameterError.about(
-                "{given}: {solver} cannot be compared with it; algorithms that take a {kind}: "
-                "{fits}.",
-                given=Setting("against", repr(name)),
-                solver=algorithm.name,
-                kind=surfaces.mesh_kind(algorithm).__name__,
-                fits=", ".join(fitting) or "none",
+            raise ParameterError(
+                f"against={name!r}: {algorithm.name} cannot be compared with it; algorithms that "
+                f"take a {surfaces.mesh_kind(algorithm).__name__}: {', '.join(fitting) or 'none'}."
             )
     return tuple(dict.fromkeys(asked))
