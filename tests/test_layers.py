@@ -75,7 +75,7 @@ BUDGETS = {
     "results": 5_390,
     "running": 7_690,
     "drawing": 1_500,
-    "report": 8_230,
+    "report": 8_260,
     "validation": 2_380,
     "api": 5_440,
     "commands": 2_980,
