@@ -77,8 +77,8 @@ BUDGETS = {
     "drawing": 1_500,
     "report": 8_260,
     "validation": 2_380,
-    "api": 5_440,
-    "commands": 2_980,
+    "api": 5_460,
+    "commands": 2_990,
 }
 
 

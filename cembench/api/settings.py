@@ -62,8 +62,8 @@ def precision_share(precision: float | str) -> float:
     return number
 
 
-def budget_seconds(budget: float | str) -> float:
-    """Return the seconds that a budget names: 90, "90s", "30m" or "2h".
+def budget_seconds(budget: float | str | None) -> float | None:
+    """Return the seconds that a budget names: 90, "90s", "30m" or "2h"; None for no limit.
 
     Raises
     ------
@@ -71,6 +71,8 @@ def budget_seconds(budget: float | str) -> float:
         It is not a time, or is outside the range.
 
     """
+    if budget is None:
+        return None
     seconds = math.nan
     try:
         if isinstance(budget, str):

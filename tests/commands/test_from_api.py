@@ -165,17 +165,17 @@ def test_the_map_of_a_file_is_that_of_parameterize(cli, cap):
         (
             lambda: cembench.benchmark(["flat-disk"], rounds=6, precision="5%"),
             ("run", "--surfaces", "flat-disk", "--rounds", 6, "--precision", "5%"),
-            "`rounds` fixes the number of rounds, and `precision` chooses it",
+            "`rounds` sets the number that `precision` chooses",
         ),
         (
             lambda: cembench.benchmark(["flat-disk"], rounds=6, budget="1m"),
             ("run", "--surfaces", "flat-disk", "--rounds", 6, "--budget", "1m"),
-            "`rounds` fixes the number of rounds, which `budget` does not shorten",
+            "`rounds` sets a number that `budget` does not shorten",
         ),
         (
             lambda: cembench.benchmark(["flat-disk"], rounds=3, max_rounds=20),
             ("run", "--surfaces", "flat-disk", "--rounds", 3, "--max-rounds", 20),
-            "`rounds` fixes the number of rounds, which `max_rounds` limits for `precision`",
+            "`rounds` sets the number that `max_rounds` limits",
         ),
         (
             lambda: cembench.benchmark(["flat-disk"], memory_bytes="much"),
