@@ -165,8 +165,8 @@ def read_shells(
                 f"{len(held)} triangles (the following numbers count within this surface)"
             )
             if isinstance(error, UnusableMeshError):
-                more = error.options, error.notices
-                raise UnusableMeshError(error.problems, error.path, where, *more) from None
+                error.where = where
+                raise
             raise MeshError(f"{where}: {error}") from None
         vertices.append(own)
         faces.append(held)

@@ -29,7 +29,7 @@ from cembench.core.names import did_you_mean
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _QUIET = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, and --json.")]
 #: The options of arguments that several functions have, and what their values are called.
-USUAL = {
+SPELLINGS = {
     "algorithm": "-a --algorithm",
     "algorithms": "-a --algorithms",
     "memory_bytes": "--memory SIZE",
@@ -45,9 +45,9 @@ NONE: Mapping[str, Any] = MappingProxyType({})
 #: What the values of options are called in the help.
 _METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
 #: From here on an upper bound is no help to a reader; the function still refuses what is above it.
-MANY = 1_000_000
+LARGEST_BOUND_SHOWN = 1_000_000
 #: Choices with more characters than this are listed in the help, not as the value's name.
-LONG = 16
+LONGEST_CHOICES = 16
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
 Call = partial[Any]
 
@@ -95,7 +95,9 @@ def from_api(
             for name, argument in arguments_of(function).items()
             if name not in {*without, *own} and (only is None or name in only)
         }
-        spelled = {name: words for name, words in (USUAL | options).items() if name in arguments}
+        spelled = {
+            name: words for name, words in (SPELLINGS | options).items() if name in arguments
+        }
         names = {k: words.split()[0] for k, words in spelled.items() if words[0] == "-"}
         words = partial(_help, names={name: names.get(name, _option(name)) for name in arguments})
         positional = inspect.signature(function).parameters
@@ -168,7 +170,7 @@ def _option_of(
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
     if _is_split(argument):
         repeatable = " Comma-separated."
-    elif len(allowed := ", ".join(argument.choices or ())) > LONG:
+    elif len(allowed := ", ".join(argument.choices or ())) > LONGEST_CHOICES:
         metavar, repeatable = metavar or "NAME", f" One of {allowed}."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if choices and not argument.many:
@@ -177,7 +179,7 @@ def _option_of(
         kind = str
     if kind in (int, float) and argument.range is not None:
         least, most = argument.range.least, argument.range.most
-        more |= {"min": least, "max": most if most < MANY else None}
+        more |= {"min": least, "max": most if most < LARGEST_BOUND_SHOWN else None}
     if kind is float:
         more["callback"] = finite
     is_list = not _is_single(argument)

@@ -18,6 +18,18 @@ from cembench.commands.options import Force
 _NUMBERED = {"vertices": "vertex", "faces": "triangle"}
 
 
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
+        "file each. OUTPUT_vertices.csv and OUTPUT_faces.csv beside it give the number that "
+        "each vertex and triangle had.",
+    ),
+]
+
+
 @app.command(
     epilog="Examples:  cembench repair scan.obj -o mended.obj  ·  "
     "cembench repair scan.ply -o mended.ply --weld 1e-6 --fill-holes 20  ·  "
@@ -33,16 +45,7 @@ def repair(
     call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
-            "file each. OUTPUT_vertices.csv and OUTPUT_faces.csv beside it give the number that "
-            "each vertex and triangle had.",
-        ),
-    ],
+    output: Output,
     force: Force = False,
     as_json: Json = False,
 ) -> None:

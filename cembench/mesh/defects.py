@@ -200,14 +200,12 @@ class RepairLossError(MeshError):
 
 
 def located(error: MeshError, path: Path | None) -> MeshError:
-    """Return the same error with the path of its file, if there is one."""
+    """Return the error with the path of its file, if there is one."""
     if path is None:
         return error
-    if isinstance(error, UnusableMeshError):
-        more = error.options, error.notices
-        return UnusableMeshError(error.problems, path, error.where, *more)
-    if isinstance(error, RepairLossError):
-        return RepairLossError(error.kept, error.options, error.better, path)
+    if isinstance(error, UnusableMeshError | RepairLossError):
+        error.path = path
+        return error
     return MeshError(f"{path}: {error}")
 
 

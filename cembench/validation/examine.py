@@ -95,19 +95,9 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
+    _check(algorithm, asked)
     maps: list[CheckedMap] = []
     solver = replace(solver, call=_noting_maps(solver.call, maps))
-    if algorithm.target == "atlas":
-        raise ParameterError(
-            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
-            "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
-        )
-    if asked.checks_only and asked.require:
-        raise ParameterError(
-            "`require` needs the stages that `checks_only` leaves out; leave one of them out."
-        )
-    if asked.up_to:
-        sizes(asked.up_to)  # fail now, not after the timing
     against = baselines(algorithm, registry, asked.against)
     work = _Work(solver, registry, folder, asked, hooks or ValidationHooks(), against)
     findings: list[ValidationFinding] = []
@@ -154,6 +144,21 @@ def examine(
     if not validation.valid:
         return validation
     return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
+
+
+def _check(algorithm: Algorithm, asked: ValidationOptions) -> None:
+    """Raise :class:`ParameterError` for what cannot be examined, before anything is timed."""
+    if algorithm.target == "atlas":
+        raise ParameterError(
+            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
+            "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
+        )
+    if asked.checks_only and asked.require:
+        raise ParameterError(
+            "`require` needs the stages that `checks_only` leaves out; leave one of them out."
+        )
+    if asked.up_to:
+        sizes(asked.up_to)
 
 
 def _noting_maps(call: Call, maps: list[CheckedMap]) -> Call:
