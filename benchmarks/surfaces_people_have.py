@@ -68,11 +68,10 @@ def _of_file(
         worst = max(m.record.outcome.metrics["angle_error_mean_deg"] for m in maps.done)
         pieces = f"{len(maps)} surfaces, " if len(maps) > 1 else ""
         said = [n for n in notes if not n.startswith("Definition 1")]
-        said = [n for n in said if "repaired: " in n or "--weld" in n] or said
+        said = [n for n in said if "repaired: " in n or "weld=" in n] or said
         note = f"; {_short(said[-1])}" if said else ""
         return {**row, "answer": "mapped", "words": f"{pieces}{worst:.2f} degrees{note}"}
     except cembench.CembenchError as error:
-        error.reword({})
         text = str(error).replace(str(path), "FILE").replace(path.stem, "FILE")
         return {**row, "answer": _followed(path, error), "words": _short(text)}
 

@@ -42,7 +42,6 @@ from cembench.core.program import (
     of_matlab_function,
     words_of,
 )
-from cembench.core.wording import Advice
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
@@ -625,15 +624,10 @@ class Registry:
         if name in self.datasets and name not in self.surfaces:
             row = self.datasets[name].paper_row
             standing = [s.name for s in self.surfaces.values() if row and s.paper_row == row]
-            raise RegistryError.about(
-                "{name!r} is a public surface, which is read from a file and not generated: "
-                "{read}.{more}",
-                name=name,
-                read=Advice(
-                    f"`cembench.load_surface({name!r})` after `cembench.fetch({name!r})`",
-                    f"`cembench fetch {name}`, then `--dataset {name}`",
-                ),
-                more=f" Its stand-in is {standing[0]}." if standing else "",
+            raise RegistryError(
+                f"{name!r} is a public surface, which is read from a file and not generated: "
+                f"`cembench fetch {name}` fetches it, and `dataset` or `load_surface` reads it."
+                + (f" Its stand-in is {standing[0]}." if standing else "")
             )
         return _look_up("surface", self.surfaces, name)
 

@@ -24,7 +24,6 @@ import numpy as np
 from cembench.core.arrays import Indices, Real
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import DatasetError, MeshError, RecordError
-from cembench.core.wording import Advice
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.formats import obj
 
@@ -100,18 +99,11 @@ def _loaded(folder: Path, there: tuple[tuple[str, int], ...]) -> FaceModel:
         return [name for name in names if name in stems]
 
     if not found((NEUTRAL,)) or not found(IDENTITIES):
-        raise DatasetError.about(
-            "the ICT face model is not in {folder}: {neutral}.obj and at least one of {first}.obj "
-            "to {last}.obj are needed. Run {fetch} (405 MB, kept as 27 MB), or set {variable} to a "
-            "folder that holds files of FaceXModel/ from github.com/ICT-VGL/ICT-FaceKit.",
-            folder=folder,
-            neutral=NEUTRAL,
-            first=IDENTITIES[0],
-            last=IDENTITIES[-1],
-            variable=FOLDER_VARIABLE,
-            fetch=Advice(
-                "`cembench.fetch(group=['ict-face'])`", "`cembench fetch --group ict-face`"
-            ),
+        raise DatasetError(
+            f"the ICT face model is not in {folder}: {NEUTRAL}.obj and at least one of "
+            f"{IDENTITIES[0]}.obj to {IDENTITIES[-1]}.obj are needed. Run `cembench fetch --group "
+            f"ict-face` (405 MB, kept as 27 MB), or set {FOLDER_VARIABLE} to a folder that holds "
+            "files of FaceXModel/ from github.com/ICT-VGL/ICT-FaceKit."
         )
     neutral, corners, sizes = _arrays(folder, NEUTRAL)
 

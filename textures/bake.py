@@ -144,6 +144,4 @@ def uv_of_faces(path: Path, F: Indices) -> Points:
 
 
 def _other_faces(path: Path) -> MeshError:
-    return MeshError.about(
-        "{path}: its faces are not those of the surface; map it without {repair}.", path=path
-    )
+    return MeshError(f"{path}: its faces are not those of the surface; map it without `repair`.")

@@ -126,11 +126,10 @@ def read_shells(
         ):
             raise
         if len(pieces) > MOST:
-            each = repair_advice(path, {"components": "all"})
-            raise MeshError.about(
-                "{path} holds {count:,} surfaces; up to {most:,} of a file are mapped at once. "
-                "{each} writes each to a file of its own.",
-                **{"path": path, "count": len(pieces), "most": MOST, "each": each},
+            raise MeshError(
+                f"{path} holds {len(pieces):,} surfaces; up to {MOST:,} of a file are mapped at "
+                f"once. {repair_advice(path, {'components': 'all'})} writes each to a file of its "
+                "own."
             ) from None
     parts = []
     for k, (own, held) in enumerate(pieces):
@@ -147,8 +146,8 @@ def read_shells(
                 f"{len(held)} triangles (the following numbers count within this surface)"
             )
             if isinstance(error, UnusableMeshError):
-                more = error.options, error.notices
-                raise UnusableMeshError(error.problems, error.path, where, *more) from None
+                error.where = where
+                raise
             raise MeshError(f"{where}: {error}") from None
     vertices, faces = zip(*pieces, strict=True)
     return Shells(path, soup.V, soup.triangles, tuple(parts), vertices, faces)

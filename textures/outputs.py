@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from cembench.api.settings import ON_THE_CIRCLE
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import file_name
 from cembench.core.overwriting import refuse_twice
-from cembench.core.wording import Advice
+from cembench.mesh.defects import repair_advice
 from cembench.mesh.files import check_writable_format
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import Algorithm
@@ -38,36 +37,30 @@ def check_algorithms(
     if overlay:
         refinement_of(first)
     exclusions: dict[str, object] = {
-        "{overlay} refines both banks of a cut in different places, so the surface cannot be "
-        "written uncut: leave out {cut}, and map what {command} writes.": overlay and cut,
-        "{overlay} makes triangles that the texture's own UVs do not know: leave out {bake}, and "
-        "use {checker}.": overlay and bake,
-        "{overlay} maps in this process, with one thread and no limits: leave out {timeout}, "
-        "{memory_bytes} and {threads}.": overlay and limited,
-        "{cut} makes a disk, which {name} does not take; name an algorithm for disks (see "
-        "{listed}).": cut and not any(issubclass(DiskMesh, a.mesh_type) for a in candidates),
-        "{uv:'square'} needs a map onto the disk, and {other} maps to another target ({target}): "
-        "take {algorithm:'direct-cem'}.": options.place == "square"
+        "`overlay` refines both banks of a cut in different places, so the surface cannot be "
+        "written uncut: leave out `cut`, and map what `cembench cut` writes.": overlay and cut,
+        "`overlay` makes triangles that the texture's own UVs do not know: leave out `bake`, and "
+        "use `checker`.": overlay and bake,
+        "`overlay` maps in this process, with one thread and no limits: leave out `timeout`, "
+        "`memory_bytes` and `threads`.": overlay and limited,
+        f"`cut` makes a disk, which {first.name} does not take; name an algorithm for disks (see "
+        "`cembench list algorithms`).": cut
+        and not any(issubclass(DiskMesh, a.mesh_type) for a in candidates),
+        f"uv='square' needs a map onto the disk, and {other.name} maps to another target "
+        f"({other.target}): take algorithm='direct-cem'.": options.place == "square"
         and other.target not in ON_THE_CIRCLE,
-        "{name} makes an atlas: map one surface at a time, without {geometry_image}, {remesh}, "
-        "{flat} and {bake}, which need one UV per vertex.": atlas
+        f"{first.name} makes an atlas: map one surface at a time, without `geometry_image`, "
+        "`remesh`, `flat` and `bake`, which need one UV per vertex.": atlas
         and (options.extras.keys() - {"html"} or bake or surfaces > 1),
     }
-    _refuse(
-        exclusions,
-        name=first.name,
-        other=other.name,
-        target=other.target,
-        command=Advice("`cembench.cut(mesh)`", "`cembench cut MESH -o CUT.obj`"),
-        listed=Advice("`cembench.list_algorithms()`", "`cembench list algorithms`"),
-    )
+    _refuse(exclusions)
 
 
-def _refuse(exclusions: Mapping[str, object], **values: object) -> None:
+def _refuse(exclusions: Mapping[str, object]) -> None:
     """Raise :class:`ParameterError` with the first message that is true of the call."""
     for message, excluded in exclusions.items():
         if excluded:
-            raise ParameterError.about(message, **values)
+            raise ParameterError(message)
 
 
 def check_options(
@@ -76,13 +69,13 @@ def check_options(
     """Raise the errors of textures and extra files before anything is mapped."""
     several, shared = len(meshes) > 1, len(set(outputs)) < len(outputs) and outputs[0]
     exclusions: dict[str, object] = {
-        "{checker} and {bake} each give a texture; choose one.": options.checker and options.bake,
-        "{bake} works with one surface; map them one by one.": options.bake and several,
-        "{checker} and {bake} need a file that uses the texture: add {output}.": options.textured
+        "`checker` and `bake` each give a texture; choose one.": options.checker and options.bake,
+        "`bake` works with one surface; map them one by one.": options.bake and several,
+        "`checker` and `bake` need a file that uses the texture: add `output`.": options.textured
         and None in outputs,
-        "surfaces in one file share the unit square: leave out {uv}.": shared
+        "surfaces in one file share the unit square: leave out `uv`.": shared
         and options.place != "unit",
-        "{geometry_image}, {remesh}, {flat} and {html} take one surface; map them one by "
+        "`geometry_image`, `remesh`, `flat` and `html` take one surface; map them one by "
         "one.": options.extras and several,
     }
     _refuse(exclusions)
@@ -98,27 +91,21 @@ def check_options(
         elif what in ("remeshed", "flat"):
             check_writable_format(path, with_uv=what == "remeshed")
         elif path.suffix.lower() not in (".html", ".htm"):
-            raise ParameterError.about(
-                "{page}: {html} writes a web page; use the suffix .html.", page=path
-            )
+            raise ParameterError(f"{path}: `html` writes a web page; use the suffix .html.")
         elif not path.parent.is_dir():
             raise MeshError(f"{path}: there is no folder {path.parent}. Make it first.")
 
 
 def check_shells(surfaces: int, path: Path, options: FileOptions) -> None:
     """Raise :class:`ParameterError` for options that a file of several surfaces cannot have."""
-    each = Advice(
-        f"`cembench.repair({str(path)!r}, components='all').meshes`",
-        f"`cembench repair {shlex.quote(str(path))} --components all -o OUT.obj`",
-    )
+    holds = f"{path} holds {surfaces} surfaces"
     exclusions: dict[str, object] = {
-        "{path} holds {surfaces} surfaces; {geometry_image}, {remesh}, {flat} and {html} take "
-        "one. {each} gives each alone.": options.extras,
-        "{path} holds {surfaces} surfaces, which share the unit square: leave out "
-        "{uv}.": options.place != "unit",
+        f"{holds}; `geometry_image`, `remesh`, `flat` and `html` take one. "
+        f"{repair_advice(path, {'components': 'all'})} gives each alone.": options.extras,
+        f"{holds}, which share the unit square: leave out `uv`.": options.place != "unit",
     }
     if surfaces > 1:
-        _refuse(exclusions, path=path, surfaces=surfaces, each=each)
+        _refuse(exclusions)
 
 
 def picture_file(source: Path, algorithm: Algorithm, output: Path | None) -> Path:
@@ -146,10 +133,9 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
         check_writable_format(output, with_uv=True)
         return [output] * len(meshes)
     if output.is_file():
-        raise ParameterError.about(
-            "{path} is a file, but there are {count} surfaces; name a folder with {output}.",
-            path=output,
-            count=len(meshes),
+        raise ParameterError(
+            f"{output} is a file, but there are {len(meshes)} surfaces; name a folder with "
+            "`output`."
         )
     if not output.parent.is_dir():
         raise MeshError(f"{output}: there is no folder {output.parent}. Make it first.")

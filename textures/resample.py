@@ -16,7 +16,6 @@ from cembench.conformal.resample import interpolated, locate, square_to_disk
 from cembench.core.arguments import Range, checked
 from cembench.core.arrays import Complex, Real
 from cembench.core.errors import ParameterError
-from cembench.core.wording import Setting
 from cembench.mesh.defects import degenerate
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
@@ -122,12 +121,10 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: Side) -> tuple[DiskMesh
     face, weights = locate(z, mesh.F, points, nearest=True)
     V = interpolated(weights, mesh.V[mesh.F[face]])
     if flat := np.count_nonzero(degenerate(V, F)):
-        raise ParameterError.about(
-            "{given} is too many for this surface: {flat:,} new triangles have no area. Take as "
-            "many as its boundary has room for, e.g. {fewer}.",
-            given=Setting("side", str(side)),
-            flat=flat,
-            fewer=Setting("side", str(max(4, min(side - 1, len(mesh.loops[0]) // 3)))),
+        raise ParameterError(
+            f"side={side} is too many for this surface: {flat:,} new triangles have no area. Take "
+            "as many as its boundary has room for, e.g. "
+            f"side={max(4, min(side - 1, len(mesh.loops[0]) // 3))}."
         )
     return DiskMesh.from_arrays(V, F, name=mesh.name), points
 

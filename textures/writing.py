@@ -24,7 +24,6 @@ from cembench.conformal.metrics import caption
 from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
 from cembench.core.notices import Notice
-from cembench.core.wording import Advice
 from cembench.mesh.files import write_mesh
 from cembench.mesh.formats import obj
 from cembench.mesh.soup import Soup, columns
@@ -176,10 +175,10 @@ def _texture(output: Path, soup: Soup, options: FileOptions, source: Shells) -> 
     from .bake import baked_png, read_texture, uv_of_faces
 
     if not source.as_read:
-        raise ParameterError.about(
-            "{bake} needs the faces of the original file, but the surface was repaired, or is not "
-            "of a file; {repair} shows what it changes. Fix the file so that it keeps its UVs.",
-            repair=Advice("`cembench.repair(surface).steps`", "`cembench repair`"),
+        raise ParameterError(
+            "`bake` needs the faces of the original file, but the surface was repaired, or is not "
+            "of a file; `cembench repair` shows what it changes. Fix the file so that it keeps "
+            "its UVs."
         )
     old = uv_of_faces(source.path, soup.triangles)
     assert soup.uv is not None

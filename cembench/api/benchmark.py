@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cembench.api.notebook import html_table, is_notebook
+from cembench.api.notebook import is_notebook
 from cembench.api.settings import (
     AnyPath,
     Backend,
@@ -22,12 +23,10 @@ from cembench.api.settings import (
     bytes_of,
     installed_backend,
     precision_share,
-    registry_with,
 )
 from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
-from cembench.core.wording import Advice
 from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
@@ -42,8 +41,12 @@ if TYPE_CHECKING:
     from cembench.running.watcher import Watcher
 
 #: Columns of :meth:`Run.table`, under the headings that they have on a terminal; 80 columns wide.
-FEW = {name: name for name in ("surface", "algorithm", "solves", "status", "seconds")}
-FEW |= {"comparable_energy": "E_C", "angle_error_mean_deg": "angle°", "flipped_triangles": "folds"}
+TABLE_COLUMNS = {name: name for name in ("surface", "algorithm", "solves", "status", "seconds")}
+TABLE_COLUMNS |= {
+    "comparable_energy": "E_C",
+    "angle_error_mean_deg": "angle°",
+    "flipped_triangles": "folds",
+}
 
 
 @dataclass(frozen=True)
@@ -120,8 +123,8 @@ class Run:
         table["comparable_energy"] = [comparable_energy(record) for record in self.records()]
         table = table.round({"comparable_energy": 4, "angle_error_mean_deg": 2, "seconds": 5})
         left_out = {"solves"} if len(table) and table["solves"].nunique() == 1 else set()
-        few = [name for name in FEW if name in table and name not in left_out]
-        return table[few].rename(columns=FEW)
+        few = [name for name in TABLE_COLUMNS if name in table and name not in left_out]
+        return table[few].rename(columns=TABLE_COLUMNS)
 
     def rows(self, reference: str = "cem") -> list[dict[str, Any]]:
         """Return the data of :meth:`table` as one dictionary per cell.
@@ -243,20 +246,7 @@ class Run:
             )
 
     def _repr_html_(self) -> str:
-        from cembench.conformal.metrics import METRICS
-        from cembench.results.columns import comparable_energy
-
-        names = ("angle_error_mean_deg", "flipped_triangles", "beltrami_area_mean")
-        shown = [metric for metric in METRICS if metric.name in names]
-        heads = ["surface", "algorithm", "status", "seconds", "E_C", *(m.title for m in shown)]
-        lines = []
-        for row, record in zip(self.rows(), self.records(), strict=True):
-            seconds, energy = row["seconds"], comparable_energy(record)
-            line = [row["mesh"], row["algorithm"], row["status"]]
-            line.append("" if seconds is None else f"{seconds:.3g}")
-            line.append("" if energy is None else f"{energy:.4f}")
-            lines.append([*line, *(m.text(row[m.name]) if m.name in row else "" for m in shown)])
-        return html_table(lines, heads)
+        return str(self.table().to_html(index=False, border=0, na_rep=""))
 
 
 @checked
@@ -420,124 +410,84 @@ def benchmark(
     ['ok']
 
     """
-    import tempfile
-
-    from cembench.api.paper_surfaces import is_kept, stand_ins
-    from cembench.api.run_plan import (
-        Plan,
-        check_cluster,
-        check_reference,
-        chosen_algorithms,
-        gather_sets,
-        part_of,
-        read_surfaces,
-    )
-    from cembench.api.sets import exhibit_of
+    asked = locals()
+    from cembench.api.run_plan import Sources, check_cluster, plan
     from cembench.results import run_folder
-    from cembench.results.exhibits import write_exhibit
-    from cembench.results.papers import NO_PAPER, find_paper, usual_paper
-    from cembench.results.profiles import Profile, algorithms_of, surfaces_of
+    from cembench.results.profiles import Profile
     from cembench.results.records import REFERENCE
-    from cembench.results.store import Store
     from cembench.running.environment import usable_cores
-    from cembench.running.external.installed import missing
     from cembench.running.options import Options
-    from cembench.running.plan import MeasurementSettings, plan_cells
+    from cembench.running.plan import MeasurementSettings
 
-    named, models = list(surfaces), Profile(profile) if profile else None
-    asked = find_paper(paper) if paper else usual_paper() if models else NO_PAPER
     if output is not None:
         run_folder.check(Path(output))
     check_cluster(cluster, pairing, reporter)
-    fixed, chosen_budget = rounds is not None, budget not in ("auto", None)
-    excluding = {
-        "{same_environment} is of {cluster}: name one, or leave it out.": (
-            same_environment and cluster is None
-        ),
-        "{rounds} fixes the number of rounds, and {precision} chooses it: give only one of them.": (
-            fixed and precision is not None
-        ),
-        "{rounds} fixes the number of rounds, which {budget} does not shorten: give only one of "
-        "them. {precision} and {max_rounds} choose the rounds within a budget.": (
-            fixed and chosen_budget
-        ),
-        "{rounds} fixes the number of rounds, which {max_rounds} limits for {precision}: give only "
-        "one of them.": fixed and max_rounds != USUAL_MOST_ROUNDS,
-        "{limit} needs {sets}: add one, or leave {limit} out.": limit is not None and not sets,
-        "{repair} works with single files and with {mesh_dir}: repair the files of a set one by "
-        "one, or leave it out.": repair and bool(sets),
-    }
-    for text, is_so in excluding.items():
-        if is_so:
-            raise ParameterError.about(text)
-    if sets and rounds is None and precision is None:
-        rounds = 1
+    _check_together(asked)
+    models = Profile(profile) if profile else None
+    rounds = rounds or (1 if sets and precision is None else 0)
     share = None if rounds else precision_share(USUAL_PRECISION if precision is None else precision)
     of_machines = cluster is not None and memory_bytes is None
-    memory = None if of_machines else bytes_of(memory_bytes)
-    usual = usual_budget(models) if budget == "auto" else None
     options = Options(
-        *(timeout, memory, fresh, rerun_failed, seed),
+        *(timeout, None if of_machines else bytes_of(memory_bytes), fresh, rerun_failed, seed),
         reference=reference or REFERENCE,
         most_rounds=max_rounds,
-        budget=budget_seconds(budget) if budget is not None and budget != "auto" else usual,
+        budget=usual_budget(models) if budget == "auto" else budget_seconds(budget),
         pairing=pairing,
         repeat_busy=repeat_busy,
         jobs=jobs or (usable_cores() if sets else 1),
     )
     library = installed_backend(backend)
-    registry = registry_with(plugins, reporter)
-    by_default = algorithms_of(models, registry) if models else registry.usual_algorithms
-    chosen = chosen_algorithms(registry, algorithms, by_default)
-    check_reference(reference, chosen)
-    for algorithm in chosen:
-        if why := missing(algorithm):
-            reporter.note(f"{algorithm.name} is not available: {why}.")
-    of_profile = surfaces_of(models, registry) if models else []
-    named += of_profile
-    if not named and not mesh_dir and not sets:
-        raise ParameterError.about(
-            "there is no surface to measure on; give at least one, or a {profile}, {mesh_dir} or "
-            "{sets}; {listed} have names.",
-            listed=Advice(
-                "`cembench.list_surfaces()` and `cembench.fetch()`",
-                "`cembench list surfaces` and `cembench fetch`",
-            ),
-        )
-    kept = [name for name in of_profile if registry.surface(name).kept]
-    new = [name for name in kept if not is_kept(registry.surface(name))]
-    if new and faces is None:
-        stand_ins(registry, new, usable_cores(), reporter)  # to be read with the others
-    with reporter.busy("reading surfaces"):
-        meshes, roles = read_surfaces(
-            *(named, map(Path, mesh_dir), registry, chosen, reporter), faces=faces, repair=repair
-        )
-    many = gather_sets(sets, registry, chosen, limit, reporter) if sets else None
-    if many is not None:
-        meshes, roles = [*meshes, *many.meshes], {**roles, **many.roles}
-    tasks = []
-    for policy in dict.fromkeys(solves):
-        settings = MeasurementSettings(policy, library, threads, rounds or 0, share)
-        tasks += plan_cells(chosen, meshes, parameters or {}, settings, plugins, roles, asked)
-    tasks = part_of(tasks, part) if part else tasks
-    folder = Path(output or tempfile.mkdtemp(prefix="cembench-run-"))
-    plan = Plan(tasks, Store(folder), options, cluster)
+    planned = plan(
+        Sources(list(surfaces), models, mesh_dir, sets, limit, faces, repair),
+        algorithms,
+        [MeasurementSettings(p, library, threads, rounds, share) for p in dict.fromkeys(solves)],
+        options,
+        output,
+        parameters=parameters,
+        plugins=plugins,
+        paper=paper,
+        part=part,
+        reference=reference,
+        cluster=cluster,
+        reporter=reporter,
+    )
+    folder, cells = planned.store.folder, len(planned.tasks)
     if dry_run:
-        return Run(folder, plan=plan)
-    if many is not None:
-        write_exhibit(folder, exhibit_of(many, sets, reporter.command))
-    else:
-        for mesh in meshes:
-            for notice in mesh.notices:
-                reporter.note(f"{mesh.name}: {notice}")
+        return Run(folder, plan=planned)
     seconds = inf if rounds else options.budget or inf
-    with reporter.watching(len(tasks), seconds, on_cluster=cluster is not None) as shown:
+    with reporter.watching(cells, seconds, on_cluster=cluster is not None) as shown:
         if reporter is SILENT and watcher is None and is_notebook():
             from cembench.api.notebook_progress import NotebookProgress
 
-            watcher = NotebookProgress(len(tasks))
-        records = plan.measure(watcher or shown, same_environment=same_environment)
-    return Run(folder, tuple(records), plan)
+            watcher = NotebookProgress(cells)
+        records = planned.measure(watcher or shown, same_environment=same_environment)
+    return Run(folder, tuple(records), planned)
+
+
+#: Arguments of :func:`benchmark` of which only one may be given, and why.
+_EXCLUDING = (
+    ("rounds", "precision", "sets the number that `precision` chooses: give only one of them"),
+    ("rounds", "budget", "sets a number that `budget` does not shorten: give only one of them"),
+    ("rounds", "max_rounds", "sets the number that `max_rounds` limits: give only one of them"),
+    ("repair", "sets", "is for single files and folders, not for `sets`: leave it out"),
+)
+#: Arguments that need another one.
+_NEEDING = (("limit", "sets"), ("same_environment", "cluster"))
+
+
+def _check_together(asked: Mapping[str, Any]) -> None:
+    """Raise :class:`ParameterError` if arguments are given that do not go together."""
+    usual = inspect.signature(benchmark).parameters
+
+    def given(name: str) -> bool:
+        return asked[name] not in (None, (), [], usual[name].default)
+
+    for one, other, why in _EXCLUDING:
+        if given(one) and given(other):
+            raise ParameterError(f"`{one}` {why}.")
+    for one, other in _NEEDING:
+        if given(one) and not given(other):
+            raise ParameterError(f"`{one}` needs `{other}`: add one, or leave `{one}` out.")
 
 
 def usual_budget(profile: Profile | None) -> float:

@@ -135,12 +135,10 @@ def catalogue(
 
     """
     if measure and kind != "surfaces":
-        raise ParameterError.about(
-            "{measure} is only for surfaces: leave it out, or add {kind:'surfaces'}."
-        )
+        raise ParameterError("`measure` is only for surfaces: leave it out, or list surfaces only.")
     if target and kind == "surfaces":
-        raise ParameterError.about(
-            "{target} is only for algorithms: leave it out, or add {kind:'algorithms'}."
+        raise ParameterError(
+            "`target` is only for algorithms: leave it out, or list algorithms only."
         )
     kind = "algorithms" if target else kind
     registry = registry_with(plugins, reporter)

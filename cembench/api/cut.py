@@ -73,7 +73,7 @@ def cut(
     from cembench.running.surfaces import load_surface
 
     if along is not None and len(through):
-        raise ParameterError.about("{along} and {through} exclude each other; give one of them.")
+        raise ParameterError("`along` and `through` exclude each other; give one of them.")
     mesh = load_surface(surface, (TriangleMesh,))
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
     try:

@@ -60,11 +60,9 @@ def texture_files(output: Path) -> list[Path]:
     texture = output.with_name(f"{output.stem}_texture.png")
     files = {".glb": [], ".obj": [texture, output.with_suffix(".mtl")], ".ply": [texture]}
     if suffix not in files:
-        raise ParameterError.about(
-            "{output_file}: {suffix} files cannot refer to a texture; use {checker} and {bake} "
-            "with .glb, .obj or .ply.",
-            output_file=output,
-            suffix=suffix,
+        raise ParameterError(
+            f"{output}: {suffix} files cannot refer to a texture; use `checker` and `bake` with "
+            ".glb, .obj or .ply."
         )
     return files[suffix]
 
@@ -120,9 +118,9 @@ def placed(z: Complex, place: Placement, surface: TriangleMesh, F: Indices) -> C
         return z * world_scale(z, surface, F)
     if place == "square":
         if np.abs(np.abs(z).max() - 1) > 1e-9:
-            raise ParameterError.about(
-                "{uv:'square'} needs a map onto the disk, which then fills the square: take "
-                "{algorithm:'direct-cem'}."
+            raise ParameterError(
+                "uv='square' needs a map onto the disk, which then fills the square: take "
+                "algorithm='direct-cem'."
             )
         return (disk_to_square(z) + (1 + 1j)) / 2
     return z

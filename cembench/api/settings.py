@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypeAlias
 from cembench.core.arguments import Range
 from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
-from cembench.core.wording import Setting
 
 if TYPE_CHECKING:
     from cembench.registry import Registry
@@ -67,15 +66,15 @@ def precision_share(precision: float | str) -> float:
     except ValueError:
         number = math.nan
     if not 0.001 <= number <= 0.5:
-        raise ParameterError.about(
-            "{given} is not allowed; write a share from 0.1% to 50%, e.g. 5% or 0.05.",
-            given=Setting("precision", repr(precision)),
+        raise ParameterError(
+            f"precision={precision!r} is not allowed; write a share from 0.1% to 50%, e.g. 5% or "
+            "0.05."
         )
     return number
 
 
-def budget_seconds(budget: float | str) -> float:
-    """Return the seconds that a budget names: 90, "90s", "30m" or "2h".
+def budget_seconds(budget: float | str | None) -> float | None:
+    """Return the seconds that a budget names: 90, "90s", "30m" or "2h"; None for no limit.
 
     Raises
     ------
@@ -83,6 +82,8 @@ def budget_seconds(budget: float | str) -> float:
         It is not a time, or is outside the range.
 
     """
+    if budget is None:
+        return None
     seconds = math.nan
     try:
         if isinstance(budget, str):
@@ -93,9 +94,8 @@ def budget_seconds(budget: float | str) -> float:
     except (ValueError, KeyError):
         pass
     if not 0 <= seconds <= LONGEST:
-        raise ParameterError.about(
-            "{given} is not a time; write a number with a unit, e.g. 90s, 30m or 2h.",
-            given=Setting("budget", repr(budget)),
+        raise ParameterError(
+            f"budget={budget!r} is not a time; write a number with a unit, e.g. 90s, 30m or 2h."
         )
     return seconds
 
@@ -114,19 +114,17 @@ def bytes_of(memory_bytes: int | str | None) -> int:
 
     if memory_bytes is None:
         return int(0.9 * psutil.virtual_memory().available)
-    setting = Setting("memory_bytes", repr(memory_bytes))
+    setting = f"memory_bytes={memory_bytes!r}"
     try:
         size: int = TypeAdapter(ByteSize).validate_python(memory_bytes)
     except (ValidationError, OverflowError):
-        raise ParameterError.about(
-            "{given} is not a size; write a number with a unit, e.g. 4GiB or 500MB.", given=setting
+        raise ParameterError(
+            f"{setting} is not a size; write a number with a unit, e.g. 4GiB or 500MB."
         ) from None
     if not LEAST_MEMORY <= size <= MOST_MEMORY:
-        raise ParameterError.about(
-            "{given} is {size:,} bytes; allowed: 256MiB (a process needs more than half of that to "
-            "load the libraries) to 1024TiB.",
-            given=setting,
-            size=size,
+        raise ParameterError(
+            f"{setting} is {size:,} bytes; allowed: 256MiB (a process needs more than half of that "
+            "to load the libraries) to 1024TiB."
         )
     return size
 

@@ -106,11 +106,10 @@ def _print_run(run: Run, reference: str | None, *, as_json: bool) -> None:
 
 def _print_plan(plan: Plan, *, as_json: bool) -> None:
     """Print which cells would be measured, and their estimated cost."""
-    from cembench.api.run_plan import plan_summary
     from cembench.commands.progress import duration
     from cembench.report.run_tables import plan_table
 
-    costs, summary = plan.costs(), plan_summary(plan)
+    costs, summary = plan.costs(), plan.summary()
     on_cluster = hours(plan.tasks, costs, plan.options.budget) if plan.cluster else None
     if as_json:
         print_json(summary | ({"cluster": on_cluster} if on_cluster else {}))

@@ -11,8 +11,27 @@ from cembench.api.cut import cut as cut_surface
 from cembench.commands.app import app
 from cembench.commands.console import Json, err, note, out, print_json
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Force
 from cembench.commands.repair import print_steps
 from cembench.core.errors import MeshError
+
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        help="File for the disk: OBJ, OFF or PLY; OUTPUT_seam.csv beside it gives, for each "
+        "vertex of the disk, the vertex of the surface that it is a copy of.",
+    ),
+]
+Along = Annotated[
+    str | None,
+    typer.Option(
+        metavar="FILE|uv",
+        help="Seams to cut along: a text file with the vertices of a seam on each line, counted "
+        "from 0, or 'uv' for the seams of the mesh file's texture coordinates.",
+    ),
+]
 
 
 @app.command(
@@ -25,33 +44,16 @@ def cut(
     call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="File for the disk: OBJ, OFF or PLY; OUTPUT_seam.csv beside it gives, for each "
-            "vertex of the disk, the vertex of the surface that it is a copy of.",
-        ),
-    ],
+    output: Output,
     between: Annotated[
         tuple[int, int] | None,
         typer.Option(metavar="A B", help="Two vertices that the cut must reach, counted from 0."),
     ] = None,
-    along: Annotated[
-        str | None,
-        typer.Option(
-            metavar="FILE|uv",
-            help="Seams to cut along: a text file with the vertices of a seam on each line, "
-            "counted from 0, or 'uv' for the seams of the mesh file's texture coordinates.",
-        ),
-    ] = None,
+    along: Along = None,
     mend: Annotated[
         bool, typer.Option("--repair", help="Repair the file first, like `cembench repair`.")
     ] = False,
-    force: Annotated[
-        bool, typer.Option("--force", help="Overwrite the input, or an existing OUTPUT_seam.csv.")
-    ] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the disk and its seam, and print the length of the cut."""

@@ -26,7 +26,6 @@ from typing import Any, NoReturn
 from typer.core import TyperGroup
 
 from cembench.commands.console import complain, err
-from cembench.commands.from_api import NAMES
 from cembench.core.errors import CembenchError
 
 BAD_USAGE, FAULT, SYSTEM, CLOSED_PIPE = 2, 70, 74, 141
@@ -142,7 +141,6 @@ def _end_of(error: Exception) -> NoReturn:
         _forget_output()
         sys.exit(CLOSED_PIPE)
     if isinstance(error, CembenchError):
-        error.reword(NAMES)
         complain(str(error))
         sys.exit(BAD_USAGE)
     trace = "".join(traceback.format_exception(error))

@@ -24,13 +24,12 @@ from typer.models import ArgumentInfo
 
 from cembench.commands.console import assignments, hushed, split
 from cembench.core.arguments import Argument, arguments_of, summary_of
-from cembench.core.errors import CembenchError
 from cembench.core.names import did_you_mean
 
 _KEYWORD = inspect.Parameter.KEYWORD_ONLY
 _QUIET = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, and --json.")]
 #: The options of arguments that several functions have, and what their values are called.
-USUAL = {
+SPELLINGS = {
     "algorithm": "-a --algorithm",
     "algorithms": "-a --algorithms",
     "memory_bytes": "--memory SIZE",
@@ -42,15 +41,13 @@ USUAL = {
 }
 #: Arguments that may be names or paths.
 PATHS = ("plugins", "sets")
-#: The options that messages name.
-NAMES = {name: spelling.split()[0] for name, spelling in USUAL.items()}
 NONE: Mapping[str, Any] = MappingProxyType({})
 #: What the values of options are called in the help.
 _METAVARS = {Path: "PATH", str: "NAME", int: "N", float: "N"}
 #: From here on an upper bound is no help to a reader; the function still refuses what is above it.
-MANY = 1_000_000
+LARGEST_BOUND_SHOWN = 1_000_000
 #: Choices with more characters than this are listed in the help, not as the value's name.
-LONG = 16
+LONGEST_CHOICES = 16
 #: A call of the function with the arguments of the command line; `call(x=1)` makes it.
 Call = partial[Any]
 
@@ -98,7 +95,9 @@ def from_api(
             for name, argument in arguments_of(function).items()
             if name not in {*without, *own} and (only is None or name in only)
         }
-        spelled = {name: words for name, words in (USUAL | options).items() if name in arguments}
+        spelled = {
+            name: words for name, words in (SPELLINGS | options).items() if name in arguments
+        }
         names = {k: words.split()[0] for k, words in spelled.items() if words[0] == "-"}
         words = partial(_help, names={name: names.get(name, _option(name)) for name in arguments})
         positional = inspect.signature(function).parameters
@@ -106,20 +105,12 @@ def from_api(
         for name, argument in arguments.items():
             named = positional[name].kind is _KEYWORD or name in names
             kind, default = _option_of(argument, spelled.get(name, ""), words, named=named)
-            if not named:
-                names[name] = spelled.get(name, name.upper())
             parameters.append(inspect.Parameter(name, _KEYWORD, default=default, annotation=kind))
 
         def command(**rest: Any) -> None:
-            try:
-                taken = {
-                    name: _value(argument, rest.pop(name)) for name, argument in arguments.items()
-                }
-                with hushed(rest.pop("quiet")):
-                    body(partial(function, **taken), **rest)
-            except CembenchError as error:
-                error.reword(NAMES | names)
-                raise
+            taken = {name: _value(argument, rest.pop(name)) for name, argument in arguments.items()}
+            with hushed(rest.pop("quiet")):
+                body(partial(function, **taken), **rest)
 
         more = [p.replace(kind=_KEYWORD) for p in [*own.values()][1:]]
         quiet = inspect.Parameter("quiet", _KEYWORD, default=False, annotation=_QUIET)
@@ -179,7 +170,7 @@ def _option_of(
     repeatable = " Repeatable." if named and not _is_single(argument) else ""
     if _is_split(argument):
         repeatable = " Comma-separated."
-    elif len(allowed := ", ".join(argument.choices or ())) > LONG:
+    elif len(allowed := ", ".join(argument.choices or ())) > LONGEST_CHOICES:
         metavar, repeatable = metavar or "NAME", f" One of {allowed}."
     more: dict[str, Any] = {"help": words(argument.meaning) + repeatable, "metavar": metavar}
     if choices and not argument.many:
@@ -188,7 +179,7 @@ def _option_of(
         kind = str
     if kind in (int, float) and argument.range is not None:
         least, most = argument.range.least, argument.range.most
-        more |= {"min": least, "max": most if most < MANY else None}
+        more |= {"min": least, "max": most if most < LARGEST_BOUND_SHOWN else None}
     if kind is float:
         more["callback"] = finite
     is_list = not _is_single(argument)
@@ -196,7 +187,8 @@ def _option_of(
     if is_list and default is not inspect.Parameter.empty:
         default = list(default or ())
     whole = list[kind] if is_list else kind if default is not None else kind | None  # type: ignore[valid-type]
-    info = typer.Option(*(flags or [_option(argument.name)]), **more)
+    # Messages call an argument by its name, so that is always one of its options.
+    info = typer.Option(*dict.fromkeys([*flags, _option(argument.name)]), **more)
     return Annotated[whole, info if named else typer.Argument(**more)], default
 
 

@@ -22,6 +22,9 @@ Surfaces = Annotated[
     list[str],
     typer.Option("--surfaces", metavar="NAME", help="Generated surfaces, comma-separated."),
 ]
+Force = Annotated[
+    bool, typer.Option("--force", "--overwrite", help="Overwrite the input, or existing files.")
+]
 Verify = Annotated[
     bool, typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample.")
 ]

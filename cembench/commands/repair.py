@@ -12,9 +12,22 @@ from cembench.api.repair import repair as repair_surface
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, note, out, print_json
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Force
 
 #: What the tables beside an output number, and the heading of its column.
 _NUMBERED = {"vertices": "vertex", "faces": "triangle"}
+
+
+Output = Annotated[
+    Path,
+    typer.Option(
+        "-o",
+        "--output",
+        help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
+        "file each. OUTPUT_vertices.csv and OUTPUT_faces.csv beside it give the number that "
+        "each vertex and triangle had.",
+    ),
+]
 
 
 @app.command(
@@ -32,20 +45,8 @@ def repair(
     call: Call,
     mesh: Annotated[Path, typer.Argument(help="Mesh file: OBJ, OFF, PLY, STL or MAT.")],
     *,
-    output: Annotated[
-        Path,
-        typer.Option(
-            "-o",
-            "--output",
-            help="File for the repaired surface: OBJ, OFF, PLY or STL; of several components, one "
-            "file each. OUTPUT_vertices.csv and OUTPUT_faces.csv beside it give the number that "
-            "each vertex and triangle had.",
-        ),
-    ],
-    force: Annotated[
-        bool,
-        typer.Option("--force", help="Overwrite the input, or existing files OUT_1, ..., *.csv"),
-    ] = False,
+    output: Output,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the repaired surfaces, and print what was done."""

@@ -11,7 +11,7 @@ import typer
 
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, fail, note, out, print_json, print_pair, warn
-from cembench.commands.options import DEFAULT_RUN, RequireSigned, Run, Verify
+from cembench.commands.options import DEFAULT_RUN, Force, RequireSigned, Run, Verify
 from cembench.core.errors import ParameterError, RecordError
 from cembench.core.overwriting import refuse_inputs
 from cembench.report.export_format import Format
@@ -264,9 +264,7 @@ def merge(
     runs: Annotated[list[Path], typer.Argument(help="The runs' folders.")],
     *,
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the merged run.")],
-    force: Annotated[
-        bool, typer.Option("--force", help="Allow the output to be one of the runs.")
-    ] = False,
+    force: Force = False,
     verify: Verify = False,
     require_signed: RequireSigned = None,
     as_json: Json = False,

@@ -17,7 +17,6 @@ from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
 from cembench.core.errors import ParameterError
-from cembench.core.wording import Setting
 
 #: The head of a section of a docstring.
 _SECTION = re.compile(r"\n\n\w[\w ]*\n-+\n")
@@ -80,11 +79,7 @@ class Argument:
             allowed = f"one of {', '.join(map(repr, self.choices))}"
         for value in passed if self.many and not isinstance(passed, str) else (passed,):
             if value is not None and not (value in self.choices or self._is_in_range(value)):
-                raise ParameterError.about(
-                    "{given} is not allowed; write {allowed}.",
-                    given=Setting(self.name, repr(value)),
-                    allowed=allowed,
-                )
+                raise ParameterError(f"{self.name}={value!r} is not allowed; write {allowed}.")
 
     def _is_in_range(self, value: Any) -> bool:
         if self.range is None or isinstance(value, str):

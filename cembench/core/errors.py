@@ -1,18 +1,10 @@
 """The errors that cembench raises on purpose. All derive from :class:`CembenchError`.
 
-A message names what is wrong, where, what is allowed and what to do. Where it names an argument, it
-does so as Python does (``rounds=6``) and, on the command line, as an option (``--rounds 6``).
+A message names what is wrong, where, what is allowed and what to do. It names arguments as Python
+does (``rounds=6``); the command line has an option of the same name (``--rounds 6``).
 """
 
 from __future__ import annotations
-
-import os
-from typing import TYPE_CHECKING, Self
-
-from cembench.core import wording
-
-if TYPE_CHECKING:
-    from collections.abc import Mapping
 
 
 class CembenchError(Exception):
@@ -28,57 +20,6 @@ class CembenchError(Exception):
     RegistryError
 
     """
-
-    _template: tuple[str, Mapping[str, object]] | None = None
-
-    @classmethod
-    def about(cls, template: str, **values: object) -> Self:
-        """Return an error whose message names arguments of the call.
-
-        Parameters
-        ----------
-        template : str
-            The message, in the syntax of ``str.format``. A field that `values` lacks names an
-            argument, ``{rounds}``, or sets it, ``{uv:'disk'}``.
-        **values
-            The other fields.
-
-        Returns
-        -------
-        CembenchError
-            The error; :meth:`reword` changes its message into that of the command line.
-
-        Examples
-        --------
-        >>> error = ParameterError.about("{file}: leave out {uv:'disk'}", file="a.obj")
-        >>> str(error)
-        "a.obj: leave out uv='disk'"
-        >>> error.reword({})
-        >>> str(error)
-        'a.obj: leave out --uv disk'
-
-        """
-        error = cls(wording.in_python(template, values))
-        error._template = (template, values)
-        return error
-
-    def without_remedy(self) -> str:
-        """Return the message without its template's `remedy`, and with files named without folders.
-
-        It is for messages about what somebody else has made, where other advice is right.
-        """
-        template, values = self._template or (str(self).replace("{", "{{").replace("}", "}}"), {})
-        shown = {
-            key: os.path.basename(one) if isinstance(one, os.PathLike) else one  # noqa: PTH119
-            for key, one in values.items()
-        }
-        return wording.in_python(template, shown | {"remedy": ""}).strip()
-
-    def reword(self, options: Mapping[str, str]) -> None:
-        """Name arguments as options in the message; `options` has the names that are irregular."""
-        if self._template is not None:
-            template, values = self._template
-            self.args, self._template = (wording.in_shell(template, values, options),), None
 
 
 class MeshError(CembenchError):
@@ -126,6 +67,14 @@ class ParameterError(CembenchError):
 class RecordError(CembenchError):
     """A run folder, or a record in it, cannot be read or written.
 
+    Parameters
+    ----------
+    message : str
+        What is wrong and what to do.
+    detail : str
+        What is wrong, without folders and advice, for a file that somebody else has made (default:
+        the message).
+
     Examples
     --------
     >>> from pathlib import Path
@@ -136,6 +85,10 @@ class RecordError(CembenchError):
     cembench.core.errors.RecordError: 'nowhere.json' cannot be read: ...
 
     """
+
+    def __init__(self, message: str, detail: str = "") -> None:
+        super().__init__(message)
+        self.detail = detail or message
 
 
 class DatasetError(CembenchError):

@@ -37,9 +37,12 @@ _LONGEST_HEADER = 10_016
 
 def damaged(path: Path, what: str, why: object) -> RecordError:
     """Return the error for a file with unexpected content."""
-    return RecordError.about(
-        "{path} is not {what}: {why}. {remedy}", path=path, what=what, why=why, remedy=REMEDY
-    )
+    return advised(path, f"is not {what}: {why}.", REMEDY)
+
+
+def advised(path: Path, text: str, remedy: str) -> RecordError:
+    """Return the error for a file, with what to do about it."""
+    return RecordError(f"{path} {text} {remedy}", f"{path.name} {text}")
 
 
 #: Errors of file system calls; ValueError is raised for an impossible file name.

@@ -15,11 +15,9 @@ def refuse_inputs(output: Path, inputs: Iterable[Path], *, force: bool) -> None:
     """
     for source in inputs:
         if not force and output.exists() and source.exists() and output.samefile(source):
-            raise ParameterError.about(
-                "the output {path} is the input {source}. Name another path, or add "
-                "{overwrite:True} to overwrite it.",
-                path=output,
-                source=source,
+            raise ParameterError(
+                f"the output {output} is the input {source}. Name another path, or add "
+                "`overwrite` to replace it."
             )
 
 
@@ -39,8 +37,6 @@ def refuse_present(outputs: Iterable[Path], *, force: bool) -> None:
     """Raise :class:`ParameterError` if one of several outputs exists, unless forced."""
     for output in outputs:
         if not force and (output.exists() or output.is_symlink()):
-            raise ParameterError.about(
-                "{path} already exists. Name another path, or add {overwrite:True} to overwrite "
-                "it.",
-                path=output,
+            raise ParameterError(
+                f"{output} already exists. Name another path, or add `overwrite` to replace it."
             )

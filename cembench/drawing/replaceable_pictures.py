@@ -22,8 +22,7 @@ def check_replaceable(path: Path) -> None:
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
         maker = None  # not a readable picture
     if path.is_symlink() or maker != SOFTWARE:
-        raise RenderError.about(
-            "{path} already exists and is not a picture that this version of cembench made. Move "
-            "it away, name another output with {output}, or add {overwrite:True} to overwrite it.",
-            path=path,
+        raise RenderError(
+            f"{path} already exists and is not a picture that this version of cembench made. Move "
+            "it away, name another output with `output`, or add `overwrite` to replace it."
         )

@@ -7,7 +7,7 @@ mesh, so that a user can repair them in one go.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -20,7 +20,6 @@ from cembench.core.arrays import Indices, Mask, Points
 from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
-from cembench.core.wording import Advice, Setting
 from cembench.mesh import topology
 from cembench.mesh.gluing import vertices_of_several_fans
 
@@ -110,82 +109,59 @@ class UnusableMeshError(MeshError):
     ) -> None:
         self.problems, self.notices = tuple(problems), notices
         self.path, self.where, self.options = path, where, dict(options or {})
-        super().__init__(self._said(lambda one: one.in_python()))
+        super().__init__(self.problems, path, where, self.options, notices)
 
-    def _said(self, word: Callable[[Advice], str]) -> str:
-        """Return the problems, and what to do."""
+    def __str__(self) -> str:
         where = "".join(f"{place}: " for place in (self.path, self.where) if place)
-        remedies = " ".join(map(word, _remedies(self.problems, self.path, self.options)))
+        remedies = " ".join(_remedies(self.problems, self.path, self.options))
         remedies += "".join(f"\nNote: {notice}." for notice in self.notices)
         if len(self.problems) == 1:
             return f"{where}{self.problems[0].text}. {remedies}"
         lines = "".join(f"\n  {k}. {p.text}." for k, p in enumerate(self.problems, start=1))
         return f"{where}{len(self.problems)} problems:{lines}\n{remedies}"
 
-    def reword(self, options: Mapping[str, str]) -> None:
-        """Advise commands instead of calls."""
-        self.args = (self._said(lambda one: one.in_shell(options)),)
 
-    def __reduce__(self) -> tuple[type[UnusableMeshError], tuple[Any, ...]]:
-        more = self.options, self.notices
-        return UnusableMeshError, (self.problems, self.path, self.where, *more)
-
-
-def repair_advice(path: Path | None, options: Mapping[str, object]) -> Advice:
-    """Return the call and the command that repair a surface with these options."""
-    call = "".join(f", {name}={value!r}" for name, value in options.items())
-    surface = "surface" if path is None else repr(str(path))
-    source = "IN" if path is None else shlex.quote(str(path))
-    settings = [Setting(name, repr(value)).in_shell({}) for name, value in options.items()]
-    command = " ".join(["cembench repair", source, "-o", _named(path, "repaired"), *settings])
-    return Advice(f"`cembench.repair({surface}{call})`", f"`{command}`")
+def repair_advice(path: Path | None, options: Mapping[str, object]) -> str:
+    """Return the command that repairs a file with these options; without a file, the call."""
+    if path is None:
+        call = "".join(f", {name}={value!r}" for name, value in options.items())
+        return f"`cembench.repair(surface{call}).mesh`"
+    words = [f"--{k.replace('_', '-')}" + f" {v}" * (v is not True) for k, v in options.items()]
+    file, repaired = shlex.quote(str(path)), _named(path, "repaired")
+    return f"`{' '.join(['cembench repair', file, '-o', repaired, *words])}`"
 
 
-def _named(path: Path | None, what: str) -> str:
+def _named(path: Path, what: str) -> str:
     """Return the name of a file that a command writes."""
-    return "OUT" if path is None else f"{shlex.quote(path.stem + '_' + what)}.obj"
+    return f"{shlex.quote(path.stem + '_' + what)}.obj"
 
 
 def _remedies(
     problems: Sequence[Problem], path: Path | None, options: Mapping[str, object]
-) -> Iterator[Advice]:
-    """Yield the calls and commands that make a surface usable, in the order of their use."""
+) -> Iterator[str]:
+    """Yield what makes a surface usable, in the order of its use."""
     needed = {p.remedy for p in problems}
-    several = "cembench.list_algorithms()", "cembench list algorithms"
-    python = "surface" if path is None else repr(str(path))
-    shell = _named(path, "repaired_1" if "components" in options else "repaired")
     if Remedy.rescale in needed:
-        text = "Angles do not depend on the scale: divide all coordinates by the same number."
-        yield Advice(text, text)
-    edges = max(p.edges for p in problems)
-    fill = {"fill_holes": edges} if Remedy.fill in needed else {}
-    if Remedy.repair in needed or fill:
+        yield "Angles do not depend on the scale: divide all coordinates by the same number."
+    fill = {"fill_holes": max(p.edges for p in problems)} if Remedy.fill in needed else {}
+    repairs = Remedy.repair in needed
+    if repairs or fill:
         does = "mends this" if len(problems) == 1 else "repairs what can be repaired"
-        does = "fills the holes" if Remedy.repair not in needed else does
-        does = _LOSSES.get(next(iter(options), ""), does)
-        only = "without --fill-holes, " if fill and Remedy.repair in needed else ""
-        stay = f"{only}use an algorithm for surfaces with holes (see `{several[1]}`)"
-        other = f", or {stay}" if fill else "" if options else ", or add --repair to map or run"
-        advice = repair_advice(path, {**options, **fill})
-        holes = " Use an algorithm for surfaces with holes where they should stay" * bool(fill)
-        yield Advice(
-            f"{advice.python} {does}; its `mesh` is the new surface."
-            + (f"{holes} (see `{several[0]}`)." if fill else ""),
-            f"{advice.shell} {does}{other}.",
-        )
-        python = "mesh"
-    else:
-        shell = "IN" if path is None else shlex.quote(str(path))
+        does = _LOSSES.get(next(iter(options), ""), does if repairs else "fills the holes")
+        other = ", or map it with `repair`" if path and not options else ""
+        if fill:
+            other = f", or {'without `fill_holes` ' * repairs}use an algorithm for surfaces with "
+            other += "holes (see `cembench list algorithms`)"
+        yield f"{repair_advice(path, {**options, **fill})} {does}{other}."
     if Remedy.cut in needed:
-        also = "--repair --cut" if python == "mesh" else "--cut"
-        yield Advice(
-            f"`cembench.cut({python})` makes it a disk; `map_files(cut=True)` writes the UVs for "
-            "the uncut surface.",
-            f"`cembench cut {shell} -o {_named(path, 'cut')}` makes it a disk, or add {also} to "
-            "map, which writes the UVs for the uncut surface.",
-        )
+        call, also = "`cembench.cut(mesh)`", "`repair` and `cut`" if repairs or fill else "`cut`"
+        if path:
+            source = _named(path, "repaired_1" if "components" in options else "repaired")
+            source = source if repairs or fill else shlex.quote(str(path))
+            call = f"`cembench cut {source} -o {_named(path, 'cut')}`"
+        yield f"{call} makes it a disk, or map it with {also}, for the UVs of the uncut surface."
     if Remedy.other_algorithm in needed:
-        yield Advice(*(f"Use an algorithm for disks (see `{one}`)." for one in several))
+        yield "Use an algorithm for disks (see `cembench list algorithms`)."
 
 
 #: What a repair does that keeps the whole surface only with an option, by its name.
@@ -194,18 +170,6 @@ _LOSSES = {
     "weld": "welds what lies apart by less than that",
     "drop": "drops what cannot be kept",
 }
-
-
-def located(error: MeshError, path: Path | None) -> MeshError:
-    """Return the same error with the path of its file, if there is one."""
-    if path is None:
-        return error
-    if isinstance(error, UnusableMeshError):
-        more = error.options, error.notices
-        return UnusableMeshError(error.problems, path, error.where, *more)
-    if isinstance(error, RepairLossError):
-        return RepairLossError(error.kept, error.options, error.better, path)
-    return MeshError(f"{path}: {error}")
 
 
 class RepairLossError(MeshError):
@@ -223,23 +187,26 @@ class RepairLossError(MeshError):
         path: Path | None = None,
     ) -> None:
         self.kept, self.options, self.better, self.path = kept, dict(options), better, path
-        super().__init__(self._said(lambda one: one.in_python()))
+        super().__init__(kept, self.options, better, path)
 
-    def _said(self, word: Callable[[Advice], str]) -> str:
+    def __str__(self) -> str:
         where = f"{self.path}: " if self.path else ""
         way = ""
         if self.options:
             does = _LOSSES[next(iter(self.options))]
-            way = f"{word(repair_advice(self.path, self.options))} {does}: {self.better}. "
-        drop = word(repair_advice(self.path, {"drop": True}))
+            way = f"{repair_advice(self.path, self.options)} {does}: {self.better}. "
+        drop = repair_advice(self.path, {"drop": True})
         return f"{where}a repair would keep only {self.kept}. {way}{drop} allows the loss."
 
-    def reword(self, options: Mapping[str, str]) -> None:
-        """Advise commands instead of calls."""
-        self.args = (self._said(lambda one: one.in_shell(options)),)
 
-    def __reduce__(self) -> tuple[type[RepairLossError], tuple[Any, ...]]:
-        return RepairLossError, (self.kept, self.options, self.better, self.path)
+def located(error: MeshError, path: Path | None) -> MeshError:
+    """Return the error with the path of its file, if there is one."""
+    if path is None:
+        return error
+    if isinstance(error, UnusableMeshError | RepairLossError):
+        error.path = path
+        return error
+    return MeshError(f"{path}: {error}")
 
 
 def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:

@@ -323,8 +323,8 @@ def _nothing_left(V: Points, F: Indices, weld: float | None) -> MeshError | Para
     """Return the error that no triangle is left, and whether the tolerance is the cause."""
     sides = side_lengths(V, F[~degenerate(V, F)])
     if weld and len(sides):
-        return ParameterError.about(
-            f"{{weld:{weld!r}}} leaves nothing: at this tolerance every triangle has corners that "
+        return ParameterError(
+            f"weld={weld!r} leaves nothing: at this tolerance every triangle has corners that "
             f"become one. The shortest side has the length {sides.min():.3g}, the longest "
             f"{sides.max():.3g}; give a tolerance well below most sides."
         )

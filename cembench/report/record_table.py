@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 from cembench.conformal.texel_density import ISLANDS, density_words, needs_islands, texture_words
-from cembench.report.declarations import own
 from cembench.report.document import Table
-from cembench.results.columns import COLUMNS, FIGURES, seconds_words, significant
-from cembench.results.frame import filled, phrase
+from cembench.results.columns import FIGURES, MIB, seconds_words, significant
+from cembench.results.comparison import is_unstable, seconds_interval
+from cembench.results.frame import listed
 from cembench.results.papers import paper_of
 from cembench.results.records import Record
 
@@ -21,19 +21,10 @@ def figures_table(
 
     `more` are further rows, of a name and words each; those without words are left out.
     """
-    known, rows = _known(record), list[tuple[str, str]]()
-    for line in own("record.toml")["lines"]:
-        if line.get("in", "") == ("few" if full else "full"):
-            continue
-        if line["name"] == "metrics":
-            rows += _metrics(record)
-        elif words := phrase([line], {}, known):
-            rows.append((filled(line["name"], {}, known), words))
+    rows = [*(_whole(record) if full else _most_looked_at(record))]
     rows += (("note", str(note)) for note in record.outcome.notes)
-    if full and (advice := texture_advice(record)):
-        rows.append(("note", advice))
-    rows += ((name, words) for name, words in more if words)
-    return Table.of("record", "", ["", ""], rows)
+    rows += [("note", texture_advice(record))] if full else []
+    return Table.of("record", "", ["", ""], [row for row in (*rows, *more) if row[1]])
 
 
 def texture_advice(record: Record) -> str:
@@ -49,25 +40,68 @@ def texture_advice(record: Record) -> str:
     return ISLANDS.replace(": ", f": {free}", 1)
 
 
-def _known(record: Record) -> dict[str, Any]:
-    """Return the columns of a record, and what of it needs words of its own.
+def _most_looked_at(record: Record) -> Iterator[tuple[str, str]]:
+    mesh, outcome = record.mesh, record.outcome
+    yield "surface", f"{record.cell.mesh}: {mesh.vertices:,} vertices, {mesh.faces:,} triangles"
+    yield "in the paper", _printed(record)
+    took = "" if outcome.median_seconds is None else f", {_seconds(record, ' s')}"
+    yield "algorithm", f"{record.title} ({record.target}){took}"
+    yield "chosen", _chosen(record)
+    error, folds = map(outcome.metrics.get, ("angle_error_mean_deg", "flipped_triangles"))
+    if error is not None:
+        quality = f"{error:.2f} degrees mean angle error, {folds} folds"
+        yield "quality", f"{quality}; -v prints all figures"
+    yield "texture", texture_words(outcome.metrics)
+    yield "folded before repair", str(outcome.folded_before_repair or "")
 
-    `tried` are the angle errors of the algorithms that one was `chosen` from.
-    """
-    outcome, known = record.outcome, {name: one.of(record) for name, one in COLUMNS.items()}
-    seconds, spoken = outcome.median_seconds, seconds_words(record)
-    chosen, tried = (outcome.extras.get(key) for key in ("chosen", "tried"))
+
+def _whole(record: Record) -> Iterator[tuple[str, str]]:
+    mesh, outcome = record.mesh, record.outcome
+    yield (
+        "surface",
+        f"{record.cell.mesh}: {mesh.vertices:,} vertices, {mesh.faces:,} faces, "
+        f"{mesh.boundary_vertices:,} on the boundary, {100 * mesh.non_delaunay_share:.1f} % of the "
+        "edges not Delaunay",
+    )
+    yield "in the paper", _printed(record)
+    given = (f"{name}={value}" for name, value in record.cell.parameters.items())
+    yield "algorithm", f"{record.title} ({record.target}){listed(' with ', given, between=', ')}"
+    yield "chosen", _chosen(record)
+    if record.external is not None:
+        yield f"external {record.external.kind}", record.external.name
+    for metric in FIGURES:
+        if metric.name in outcome.metrics:
+            text = metric.text(outcome.metrics[metric.name], precise=True)
+            yield metric.title, f"{text} {metric.unit}".rstrip()
+    if outcome.folded_before_repair is not None:
+        yield "folded before repair", str(outcome.folded_before_repair)
+    yield "iterations", str(outcome.iterations or "")
     phases = ", ".join(f"{name} {significant(s)}" for name, s in outcome.phases.items())
-    compared = tried if isinstance(chosen, str) and isinstance(tried, Mapping) else {}
-    return known | {
-        "in_the_paper": _printed(record) if record.mesh.paper_row else "",
-        "took": "" if seconds is None else f", {spoken or f'{significant(seconds)} s'}",
-        "timing": "" if seconds is None else spoken or f"{significant(seconds)} ({phases})",
-        "given": [f"{name}={value}" for name, value in record.cell.parameters.items()],
-        "chosen": chosen,
-        "tried": [f"{name} {_compared(one)}" for name, one in compared.items()],
-        "texture": texture_words(outcome.metrics),
-    }
+    yield "seconds", "" if outcome.median_seconds is None else _seconds(record, f" ({phases})")
+    if interval := seconds_interval(record):
+        low, high = (significant(end, 4) for end in (interval.low, interval.high))
+        unstable = ", unstable" if is_unstable(record) else ""
+        yield "95 % interval", f"{low} to {high} s over {len(outcome.rounds)} rounds{unstable}"
+        fastest = min(min(measured.calls) for measured in outcome.rounds)
+        yield "fastest call", f"{significant(fastest, 4)} s"
+    if outcome.memory_increase_bytes is not None and outcome.peak_memory_bytes is not None:
+        more = f"{outcome.memory_increase_bytes / MIB:,.0f} more than before the call"
+        about = "of the program's processes" if record.is_program else more
+        yield "memory", f"{outcome.peak_memory_bytes / MIB:,.0f} MiB at most, {about}"
+
+
+def _seconds(record: Record, after: str) -> str:
+    """Return the seconds, and what comes after them; or those of an external program."""
+    return seconds_words(record) or f"{significant(record.outcome.median_seconds or 0.0)}{after}"
+
+
+def _chosen(record: Record) -> str:
+    """Return which algorithm was chosen, and the figures of those that it was chosen from."""
+    chosen, tried = (record.outcome.extras.get(key) for key in ("chosen", "tried"))
+    if not (isinstance(chosen, str) and isinstance(tried, Mapping) and tried):
+        return ""
+    compared = ", ".join(f"{name} {_compared(one)}" for name, one in tried.items())
+    return f"{chosen}, by the angle errors in degrees (and texel density): {compared}"
 
 
 def _compared(one: Any) -> str:
@@ -77,17 +111,11 @@ def _compared(one: Any) -> str:
     return f"{one['angle_error_mean_deg']:.2f} ({density_words(one['texel_density_ratio'])})"
 
 
-def _metrics(record: Record) -> Iterator[tuple[str, str]]:
-    held = record.outcome.metrics
-    for metric in FIGURES:
-        if metric.name in held:
-            text = metric.text(held[metric.name], precise=True)
-            yield metric.title, f"{text} {metric.unit}".rstrip()
-
-
 def _printed(record: Record) -> str:
-    """Return the paper's printed figures for this surface and algorithm, as text."""
+    """Return the paper's printed figures for this surface and algorithm; "" for other surfaces."""
     row, name = record.mesh.paper_row, record.cell.algorithm
+    if not row:
+        return ""
     what = f"it is {row}" if record.mesh.origin == "model" else f"it stands in for {row}"
     energy, mean, sd = (
         paper_of(row).printed_figure(column, name, row)

@@ -676,10 +676,9 @@ def find_paper(named: str, *, trust: bool = False) -> Paper:
     """
     code = code_of(named)
     if code is not None and not trust:
-        raise ParameterError.about(
-            "{code} would run with your rights, as part of a paper that is not installed. Read it, "
-            "and add {trust:True} if you trust its authors.",
-            code=code,
+        raise ParameterError(
+            f"{code} would run with your rights, as part of a paper that is not installed. Read "
+            "it, and add `trust` if you trust its authors."
         )
     if named in papers():
         return papers()[named]

@@ -47,6 +47,7 @@ from cembench.core.errors import RecordError
 from cembench.core.folders import is_empty_file
 from cembench.core.loading import (
     REMEDY,
+    advised,
     damaged,
     files_in,
     is_there,
@@ -319,11 +320,7 @@ def read_record(path: Path) -> Record:
     """Return the record in ``RUN/records/NAME``; raise :class:`RecordError` if it is not valid."""
     record = read_model(path, Record, path.parents[1])
     if record.schema_version != SCHEMA_VERSION:
-        raise RecordError.about(
-            "{path} is of schema version {version}; this cembench reads {known}. {remedy}",
-            path=path,
-            version=record.schema_version,
-            known=SCHEMA_VERSION,
-            remedy="Run again into another folder.",
-        )
+        version = f"is of schema version {record.schema_version}"
+        reads = f"this cembench reads {SCHEMA_VERSION}."
+        raise advised(path, f"{version}; {reads}", "Run again into another folder.")
     return record

@@ -23,7 +23,6 @@ from cembench.conformal.atlas import atlas_metrics
 from cembench.conformal.metrics import all_metrics
 from cembench.core.errors import RecordError
 from cembench.core.loading import read_bytes
-from cembench.core.wording import Advice
 from cembench.results.records import Record, altered
 from cembench.results.store import Store, read_record
 
@@ -95,7 +94,7 @@ def verify(store: Store, depth: Depth) -> Verified:
         try:
             records[file] = read_record(file)
         except RecordError as error:
-            findings.append(Finding(file, Kind.damaged, error.without_remedy()))
+            findings.append(Finding(file, Kind.damaged, error.detail))
         else:
             findings += verify_record(file, records[file])
     for file, record in _chosen(records, depth):
@@ -122,16 +121,10 @@ def sound_records(store: Store, depth: Depth) -> list[Record]:
 def _refusal(store: Store, found: Sequence[Finding]) -> RecordError:
     named = "\n".join(f"  {finding}" for finding in found[:_NAMED])
     more = f"\n  and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-    return RecordError.about(
-        "{folder} cannot be used: its records or maps are not as they were written.\n"
-        "{named}{more}\nDelete these files and run again, or restore them. {everything} compares "
-        "everything.",
-        folder=store.folder,
-        named=named,
-        more=more,
-        everything=Advice(
-            "`report(verify=True)` of the run", f"`cembench status {store.folder} --verify`"
-        ),
+    return RecordError(
+        f"{store.folder} cannot be used: its records or maps are not as they were written.\n"
+        f"{named}{more}\nDelete these files and run again, or restore them. "
+        f"`cembench status {store.folder} --verify` compares everything."
     )
 
 
@@ -158,7 +151,7 @@ def verify_map(store: Store, file: Path, record: Record) -> Iterator[Finding]:
     try:
         uv, mesh = store.uv(cell), store.mesh(cell)
     except RecordError as error:
-        yield Finding(file, Kind.damaged, error.without_remedy())
+        yield Finding(file, Kind.damaged, error.detail)
         return
     if uv is None or mesh is None:
         if outcome.metrics:

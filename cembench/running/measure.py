@@ -214,10 +214,9 @@ def refinement_of(algorithm: Algorithm) -> Callable[..., Any]:
 
     """
     if algorithm.refinement is None:
-        raise ParameterError.about(
-            "{name} has no {overlay}, its map is on the surface's own triangles; use "
-            "{algorithm:'cetm-flips'}.",
-            name=algorithm.name,
+        raise ParameterError(
+            f"{algorithm.name} has no `overlay`, its map is on the surface's own triangles; use "
+            "algorithm='cetm-flips'."
         )
     return algorithm.refinement
 

@@ -11,7 +11,6 @@ from typing import Any
 from cembench.conformal.laplacian import non_delaunay_share
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import did_you_mean
-from cembench.core.wording import Setting
 from cembench.linear_algebra.backends import default_backend
 from cembench.mesh.datasets import Dataset
 from cembench.mesh.files import READERS, is_named_like_a_mesh
@@ -231,11 +230,7 @@ def mesh_files(folder: Path) -> list[Path]:
         why = f"holds no file of a mesh ({', '.join(k for k in READERS if k not in _OF_ANYTHING)})"
         if files:
             return files
-    raise MeshError.about(
-        "{given} {why}; name another, or single files.",
-        given=Setting("mesh_dir", repr(str(folder))),
-        why=why,
-    )
+    raise MeshError(f"mesh_dir={str(folder)!r} {why}; name another, or single files.")
 
 
 def provenances(registry: Registry, names: Iterable[str]) -> dict[str, Provenance]:

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 
 from cembench.core.errors import MeshError
 from cembench.core.names import did_you_mean
-from cembench.core.wording import Advice
 from cembench.mesh.cut import Cut, cut_open
 from cembench.mesh.datasets import is_fetched, surface_file
 from cembench.mesh.defects import located
@@ -190,9 +189,7 @@ def file_named(path: Path, registry: Registry) -> Path:
             + did_you_mean(name, [*registry.surfaces, *registry.datasets, *mesh_names(Path())])
         )
     if not is_fetched(dataset):
-        raise MeshError.about(
-            "the public surface {name!r} is not here yet: {fetch} fetches it.",
-            name=name,
-            fetch=Advice(f"`cembench.fetch({name!r})`", f"`cembench fetch {name}`"),
+        raise MeshError(
+            f"the public surface {name!r} is not here yet: `cembench fetch {name}` fetches it."
         )
     return surface_file(dataset)

@@ -208,7 +208,7 @@ def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, 
         columns += [Column(title, group), Column(against.title, group, detail=True)]
         own = program if group == "seconds" else ()
         columns += [Column(name, group) for name in (*own, "ratio")]
-    notes = ["a dash: no valid map, or no positive figure to divide by"]
+    notes = ["a dash: no valid map"]
     if program:
         notes.append(
             "an external program: its seconds are the wall clock of a process, with its start and "
@@ -238,7 +238,7 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     yield from (pair.surface, words(f"{pair.faces:,}"))
     yield measured(pair.energy, ".6f")
     yield measured(pair.baseline_energy, ".6f", theirs)
-    yield ratio(quotient(pair.energy, pair.baseline_energy))
+    yield ratio(pair.energy_ratio)
     yield measured(pair.angle, ".3f")
     yield measured(pair.baseline_angle, ".3f", theirs)
     yield ratio(pair.angle_ratio)
@@ -247,11 +247,6 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     if program:
         yield from (measured(s, ".4f") for s in (pair.start_seconds, pair.solve_seconds))
     yield ratio(pair.speed.ratio if pair.speed else None)
-
-
-def quotient(ours: float | None, theirs: float | None) -> float | None:
-    """Return ours over theirs; None if one is missing or theirs is not positive."""
-    return None if ours is None or theirs is None or theirs <= 0 else ours / theirs
 
 
 def _growth_table(compared: GrowthComparison) -> Table:

@@ -11,7 +11,6 @@ from typing import Any
 
 from cembench.core.arrays import Complex
 from cembench.core.errors import ParameterError
-from cembench.core.wording import Setting
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry
 from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Outcome, Record
@@ -96,19 +95,9 @@ def examine(
     """
     started = monotonic()
     algorithm = solver.algorithm
+    _check(algorithm, asked)
     maps: list[CheckedMap] = []
     solver = replace(solver, call=_noting_maps(solver.call, maps))
-    if algorithm.target == "atlas":
-        raise ParameterError(
-            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
-            "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
-        )
-    if asked.checks_only and asked.require:
-        raise ParameterError.about(
-            "{require} needs the stages that {checks_only} leaves out; leave one of them out."
-        )
-    if asked.up_to:
-        sizes(asked.up_to)  # fail now, not after the timing
     against = baselines(algorithm, registry, asked.against)
     work = _Work(solver, registry, folder, asked, hooks or ValidationHooks(), against)
     findings: list[ValidationFinding] = []
@@ -155,6 +144,21 @@ def examine(
     if not validation.valid:
         return validation
     return validation.model_copy(update={"unmet": unmet(asked.require, validation)})
+
+
+def _check(algorithm: Algorithm, asked: ValidationOptions) -> None:
+    """Raise :class:`ParameterError` for what cannot be examined, before anything is timed."""
+    if algorithm.target == "atlas":
+        raise ParameterError(
+            f"{algorithm.name} makes an atlas, but validate examines maps with one UV per vertex. "
+            "Measure it with `cembench run` or `cembench peers`, which have figures for islands."
+        )
+    if asked.checks_only and asked.require:
+        raise ParameterError(
+            "`require` needs the stages that `checks_only` leaves out; leave one of them out."
+        )
+    if asked.up_to:
+        sizes(asked.up_to)
 
 
 def _noting_maps(call: Call, maps: list[CheckedMap]) -> Call:
@@ -301,12 +305,8 @@ def baselines(
     for name in asked:
         if not fits(algorithm, registry.algorithm(name)):
             fitting = [one.name for one in registry.algorithms.values() if fits(algorithm, one)]
-            raise ParameterError.about(
-                "{given}: {solver} cannot be compared with it; algorithms that take a {kind}: "
-                "{fits}.",
-                given=Setting("against", repr(name)),
-                solver=algorithm.name,
-                kind=surfaces.mesh_kind(algorithm).__name__,
-                fits=", ".join(fitting) or "none",
+            raise ParameterError(
+                f"against={name!r}: {algorithm.name} cannot be compared with it; algorithms that "
+                f"take a {surfaces.mesh_kind(algorithm).__name__}: {', '.join(fitting) or 'none'}."
             )
     return tuple(dict.fromkeys(asked))

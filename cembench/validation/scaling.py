@@ -19,7 +19,6 @@ from typing import Literal, NamedTuple
 from pydantic import BaseModel, ConfigDict
 
 from cembench.core.errors import ParameterError
-from cembench.core.wording import Setting
 from cembench.results.intervals import ERROR, LOOKS, Interval, next_look, share
 from cembench.results.rank_tests import centre_interval
 from cembench.results.records import Record, Round, lower_median
@@ -102,11 +101,9 @@ def sizes(up_to: int) -> tuple[int, ...]:
 
     """
     if up_to < LEAST_UP_TO:
-        raise ParameterError.about(
-            "{given} is too few to fit an exponent; allowed are {least:,} triangles and more, or 0 "
-            "to leave that stage out.",
-            given=Setting("up_to", str(up_to)),
-            least=LEAST_UP_TO,
+        raise ParameterError(
+            f"up_to={up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
+            "and more, or 0 to leave that stage out."
         )
     return up_to // 9, up_to // 3, up_to
 

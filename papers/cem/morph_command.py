@@ -13,6 +13,7 @@ import typer
 from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, complain, out, print_json, print_pair, split
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Force
 from cembench.core.errors import AlgorithmFailed
 
 from .morph import morph as morph_surfaces
@@ -52,7 +53,7 @@ def morph(
     run: Annotated[
         Path | None, typer.Option("--run", help="Add the pictures and figures to this run.")
     ] = None,
-    force: Annotated[bool, typer.Option("--force", help="Overwrite the input files.")] = False,
+    force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the films and meshes of the path, and print how well the surfaces are registered."""

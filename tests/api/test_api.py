@@ -65,7 +65,7 @@ def test_a_result_shows_and_saves_itself(disk, tmp_path):
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     saved = result.save(tmp_path / "a.obj")
     assert cembench.read_mesh(saved).hash == disk.hash
-    with pytest.raises(cembench.ParameterError, match="overwrite=True"):
+    with pytest.raises(cembench.ParameterError, match="`overwrite`"):
         result.save(saved)
     result.save(saved, overwrite=True)
     with pytest.raises(cembench.ParameterError, match="the picture is a PNG"):

@@ -92,7 +92,7 @@ def test_only_a_disk_fills_the_square(cap, tmp_path, cli):
     arguments = ("map", tmp_path / "a.obj", "-a", "lscm", "-o", "b.obj", "--uv", "square")
     code, _, err = cli(*arguments)
     assert code == 2
-    assert "--uv square needs a map onto the disk, and lscm maps" in " ".join(err.split())
+    assert "uv='square' needs a map onto the disk, and lscm maps" in " ".join(err.split())
     assert not (cli.folder / "b.obj").exists()
     with pytest.raises(ParameterError, match="needs a map onto the disk"):
         cembench.parameterize(cap, "lscm").save(tmp_path / "c.obj", uv="square")

@@ -156,9 +156,9 @@ def test_a_run_over_a_set_has_one_round_and_keeps_what_the_set_gave(cli, folder,
 @pytest.mark.parametrize(
     ("given", "words"),
     [
-        (["--limit", "3", "--surfaces", "flat-disk"], "--limit needs --set"),
+        (["--limit", "3", "--surfaces", "flat-disk"], "`limit` needs `sets`"),
         (["--set", "EMPTY"], "is accepted by the chosen algorithms"),
-        (["--set", "EMPTY", "--repair"], "--repair works with single files"),
+        (["--set", "EMPTY", "--repair"], "`repair` is for single files"),
         (["--set", "nowhere"], "there is no set 'nowhere'"),
     ],
 )

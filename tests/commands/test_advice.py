@@ -55,7 +55,7 @@ def test_the_options_that_an_error_names_end_in_a_map_too(cli, surface):
         code, _, err = cli(*call)
         if code == 0:
             break
-        text = " ".join(err.split())
+        text = in_options(err)
         option = next(o for o in ("--cut", "algorithm for disks") if o in text)
         assert option not in advised, err
         advised.append(option)
@@ -116,12 +116,19 @@ CLASHES = (
 OPTION = re.compile(r"(?<![\w-])--?[a-z][\w-]*")
 #: Values of options that an error says to add.
 VALUES = {
-    "-o": ["out.obj"],
+    "--output": ["out.obj"],
     "--mesh-dir": ["folder"],
     "--set": ["folder"],
     "--cluster": ["local:1"],
     "--command": ["true {input} {output}"],
 }
+
+
+def in_options(text):
+    """Return a message on one line, with the arguments that it names as options."""
+    text = re.sub(r"`(\w+)`", lambda m: f"--{m[1].replace('_', '-')}", " ".join(text.split()))
+    text = re.sub(r"\b([a-z_]+)='?([\w.-]*\w)'?", r"--\1 \2", text)
+    return text.replace("--memory-bytes", "--memory").replace("--sets", "--set")
 
 
 def with_options(call, *without, **more):
@@ -175,15 +182,15 @@ ADVICE = (
         r"(?:needs|is of) (--[\w-]+)(?:: (?:add|name) one| COMMAND)",
         lambda call, m: [added(call, m[1])],
     ),
-    (r"add (-o|--force|--repair)", lambda call, m: [added(call, m[1])]),
+    (r"(?:add|with) (--output|--overwrite|--repair)", lambda call, m: [added(call, m[1])]),
     (r"choose one|only one of them", each_alone),
     (r"them (?:one by one|one at a time|to different folders)\.", one_by_one),
-    (r"use -a ([\w-]+)\.", lambda call, m: [with_options(call, a=[m[1]])]),
+    (r"(?:use|take) --algorithm ([\w-]+)\.", lambda call, m: [with_options(call, a=[m[1]])]),
     (r"an algorithm for disks", lambda call, m: [with_options(call, a=["direct-cem"])]),
     (r"error: (\S+): (?!unknown).*?(?:the suffix|allowed(?: here)?:|with) (\.\w+)[,.]", suffix),
     (r"there is no folder (\w+)\. Make it first", in_a_new_folder),
     (r"e\.g\. --side (\d+)", lambda call, m: [with_options(call, side=[m[1]])]),
-    (r"name a folder with -o", lambda call, m: [with_options(call, o=["folder"])]),
+    (r"name a folder with --output", lambda call, m: [with_options(call, o=["folder"])]),
     (r"Name another path", lambda call, m: [with_options(call, o=["another.obj"])]),
     (r"(?:[Ee]xport|download) it again|In MATLAB, save it", exported_again),
     (r"Convert the file to one of these", lambda call, _: [["map", "whole/mine.obj"]]),
@@ -228,7 +235,7 @@ def walked(cli, call, seen=()):
     if code != 2:
         assert code == 0 or "--command" in call, err  # `true` writes no map
         return
-    text = " ".join(err.split())
+    text = in_options(err)
     assert text not in seen, err
     following = []
     for command in re.findall(r"`cembench ((?:repair|cut) [^`]*)`", text):

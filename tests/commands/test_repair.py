@@ -189,7 +189,7 @@ def test_several_files_need_a_folder_and_names_of_their_own(tmp_path, cli):
         file.write_text(text)
     (tmp_path / "taken").write_text("mine")
     code, _, err = cli("map", *files, "-o", tmp_path / "taken")
-    assert (code, "name a folder with -o" in err) == (2, True)
+    assert (code, "name a folder with `output`" in err) == (2, True)
     code, _, err = cli("map", *files, "-o", "maps")
     assert (code, "two surfaces would be written to maps/a.obj" in err) == (2, True)
     code, _, err = cli("map", files[0], tmp_path / "missing.obj", "-o", "maps")

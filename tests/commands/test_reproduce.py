@@ -103,6 +103,6 @@ def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model
 def test_a_budget_that_is_not_a_time_is_refused_before_anything_is_done(cli, one_model):
     code, _, err = cli("reproduce", "--budget", "soon")
     assert code == 2
-    assert "--budget soon is not a time" in err
+    assert "budget='soon' is not a time" in err
     assert one_model.asked == 0
     assert not list(cli.folder.iterdir())

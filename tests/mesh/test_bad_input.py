@@ -155,4 +155,4 @@ def test_a_folder_that_is_none_or_holds_no_mesh(cli, tmp_path):
         (tmp_path, "holds no file of a mesh (.obj, .off,"),
     ):
         code, _, err = cli("run", "--mesh-dir", folder)
-        assert (code, f"--mesh-dir {folder} {message}" in err) == (2, True), err
+        assert (code, f"mesh_dir={str(folder)!r} {message}" in err) == (2, True), err

@@ -26,10 +26,7 @@ def test_refused_with_all_causes_then_mended_then_mapped(defects, tmp_path):
         named = {p.defect for p in refused.value.problems}
         assert expected <= named
         assert (Defect.orientation in named) >= (turned in defects)
-        assert f"cembench.repair({str(path)!r}" in str(refused.value)
-        refused.value.reword({})
         assert f"cembench repair {path} -o broken_repaired.obj" in str(refused.value)
-        assert "cembench." not in str(refused.value)
     else:
         assert read_mesh(path).notices
     repaired = repair_soup(read_soup(path), drop=crumb in defects)

@@ -106,4 +106,4 @@ def test_the_command_takes_a_file_of_seams_or_uv(tmp_path, cli):
     code, _, err = cli("cut", path, "-o", "f.obj", "--along", tmp_path / "bad.txt")
     assert (code, "cannot be read as seams" in " ".join(err.split())) == (2, True)
     code, _, err = cli("cut", path, "-o", "f.obj", "--along", "uv", "--between", "4", "5")
-    assert (code, "--along and" in " ".join(err.split())) == (2, True)
+    assert (code, "`along` and" in " ".join(err.split())) == (2, True)

@@ -227,12 +227,8 @@ def test_of_duplicate_triangles_the_first_stays():
 @pytest.mark.parametrize("weld", [1.2, 100.0])
 def test_a_tolerance_that_leaves_nothing_is_named_as_the_cause(weld):
     V, F = gallery.flat_rectangle()
-    with pytest.raises(
-        ParameterError, match=rf"^weld={weld} leaves .* 1, the longest 1\.41; give"
-    ) as no:
+    with pytest.raises(ParameterError, match=rf"^weld={weld} leaves .* 1, the longest 1\.41; give"):
         repair(V, F, weld=weld)
-    no.value.reword({})
-    assert str(no.value).startswith(f"--weld {weld} leaves nothing")
     with pytest.raises(MeshError, match="damaged"):
         repair(V, F[:, [0, 0, 1]], weld=weld)
 

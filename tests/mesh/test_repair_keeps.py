@@ -167,9 +167,8 @@ def test_pieces_are_lost_only_on_request(count):
     with pytest.raises(RepairLossError, match=f"1 of {count} pieces") as lost:
         repair(all_V, all_F)
     assert lost.value.options == {"components": "all"}
-    lost.value.reword({})
-    assert "`cembench repair IN -o OUT --components all` keeps every piece" in str(lost.value)
-    assert "`cembench repair IN -o OUT --drop` allows the loss" in str(lost.value)
+    assert "`cembench.repair(surface, components='all').mesh` keeps every piece" in str(lost.value)
+    assert "`cembench.repair(surface, drop=True).mesh` allows the loss" in str(lost.value)
     assert len(repair(all_V, all_F, components="all").surfaces) == count
     one = repair(all_V, all_F, drop=True)
     assert len(one.surfaces) == 1

@@ -86,7 +86,7 @@ def test_code_of_a_folder_that_is_not_installed_needs_trust(
     code, _, error = cli("report", small_run, "-o", "out", "--paper", folder)
     assert code == 2
     assert "would run with your rights" in " ".join(error.split())
-    assert "--trust" in error
+    assert "add `trust`" in error
     assert not (tmp_path / "ran").exists()
     assert not (cli.folder / "out").exists()
     monkeypatch.setattr("sys.stdin.isatty", lambda: True, raising=False)

@@ -130,4 +130,4 @@ def test_list_tells_what_is_known_and_measures_on_request(cli, known):
 def test_measuring_goes_with_surfaces(cli):
     code, _, err = cli("list", "--measure")
     assert code == 2
-    assert "leave it out, or add surfaces." in err
+    assert "leave it out, or list surfaces only." in err

@@ -68,8 +68,6 @@ def test_an_edited_figure_is_found_by_the_digest_and_by_the_map(store):
     assert kinds(store, Depth.records) == {Kind.digest}
     with pytest.raises(RecordError, match=r"--cem--.*changed after it was written") as caught:
         sound_records(store, Depth.records)
-    assert "`report(verify=True)` of the run compares everything" in str(caught.value)
-    caught.value.reword({})
     assert f"`cembench status {store.folder} --verify` compares" in str(caught.value)
 
 

@@ -135,7 +135,5 @@ def test_what_is_not_a_surface_gets_a_sentence_with_a_remedy(surface, message):
 def test_a_public_surface_that_is_not_here_says_how_to_fetch_it(monkeypatch, tmp_path):
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path))
     name = next(iter(load_registry().datasets))
-    with pytest.raises(MeshError, match=f"cembench.fetch..{name}") as refused:
+    with pytest.raises(MeshError, match=f"`cembench fetch {name}`"):
         load_surface(name)
-    refused.value.reword({})
-    assert f"`cembench fetch {name}`" in str(refused.value)

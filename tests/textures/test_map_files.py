@@ -279,12 +279,18 @@ def test_overlays_of_several_surfaces_go_to_one_file_or_to_several(cli, bumpy, g
 @pytest.mark.parametrize(
     ("options", "remedy"),
     [
-        ((), "plane has no --overlay, .* use -a cetm-flips"),
-        (("-a", "cem"), "cem has no --overlay, .* use -a cetm-flips"),
-        (("-a", "cetm-flips", "--cut"), "leave out --cut, and map what `cembench cut"),
-        (("-a", "cetm-flips", "--bake", "paint.png", "-o", "x.obj"), "leave out --bake"),
-        (("-a", "cetm-flips", "--timeout", "5"), "leave out --timeout, --memory and --threads"),
-        (("-a", "cetm-flips", "--threads", "2"), "leave out --timeout, --memory and --threads"),
+        ((), "plane has no `overlay`, .* use algorithm='cetm-flips'"),
+        (("-a", "cem"), "cem has no `overlay`, .* use algorithm='cetm-flips'"),
+        (("-a", "cetm-flips", "--cut"), "leave out `cut`, and map what `cembench cut"),
+        (("-a", "cetm-flips", "--bake", "paint.png", "-o", "x.obj"), "leave out `bake`"),
+        (
+            ("-a", "cetm-flips", "--timeout", "5"),
+            "leave out `timeout`, `memory_bytes` and `threads`",
+        ),
+        (
+            ("-a", "cetm-flips", "--threads", "2"),
+            "leave out `timeout`, `memory_bytes` and `threads`",
+        ),
     ],
 )
 def test_an_overlay_says_what_it_does_not_go_with(cli, bumpy, options, remedy):

@@ -365,10 +365,10 @@ class _ClusterRun:
     def _check_workers(self, connected: Sequence[_Worker]) -> None:
         """Raise :class:`ClusterError` if no worker measures, and none is to be expected."""
         if self.same_environment and connected and all(one.differs for one in connected):
-            raise ClusterError.about(
-                "no worker has the software of this machine ({differing}). Install the same on the "
-                "workers, or leave out {same_environment}.",
-                differing=f"{connected[-1].machine}: {connected[-1].differs}",
+            raise ClusterError(
+                "no worker has the software of this machine "
+                f"({connected[-1].machine}: {connected[-1].differs}). Install the same on the "
+                "workers, or leave out `same_environment`."
             )
         cluster, alone = self.client.cluster, self.looked - self.met
         if connected:
@@ -380,11 +380,9 @@ class _ClusterRun:
                 "the same command goes on."
             )
         elif (refused := refusals(cluster)) and len(refused) >= len(cluster.worker_spec):
-            raise ClusterError.about(
-                "Slurm takes no job: {cause}; {kept}. Correct the settings in {cluster}; the same "
-                "command goes on.",
-                cause=refused[-1],
-                kept=self._finished,
+            raise ClusterError(
+                f"Slurm takes no job: {refused[-1]}; {self._finished}. Correct the settings in "
+                "`cluster`; the same command goes on."
             )
 
     @property

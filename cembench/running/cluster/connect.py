@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from cembench.core.errors import ClusterError, ParameterError
 from cembench.core.extras import Extra, require
-from cembench.core.wording import Setting
 from cembench.running.cluster.host import place
 
 if TYPE_CHECKING:
@@ -107,8 +106,7 @@ def parse_cluster(text: str) -> ClusterPlace:
 
 
 def _wrong(text: str, allowed: str) -> ParameterError:
-    setting = Setting("cluster", repr(text))
-    return ParameterError.about("{given} is not allowed; {allowed}", given=setting, allowed=allowed)
+    return ParameterError(f"cluster={text!r} is not allowed; {allowed}")
 
 
 def _settings(text: str) -> dict[str, str]:
