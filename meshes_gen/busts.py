@@ -31,11 +31,8 @@ def nefertiti_body(seed: int = 0) -> Body:
 
     def f(p: Real) -> Real:
         d = head(p)
-        d = join(
-            d,
-            tube(p, [(0, 0.16, -0.5), (lean, 0.34, -1.35), (0, 0.62, -2.2)], [0.40, 0.33, 0.42]),
-            0.15,
-        )
+        neck = [(0, 0.16, -0.5), (lean, 0.34, -1.35), (0, 0.62, -2.2)]
+        d = join(d, tube(p, neck, [0.40, 0.33, 0.42]), 0.15)
         base = ellipsoid(p, (0, 0.70, -2.5), (1.15, 0.52, 0.55))
         d = join(d, base, 0.25)
         axis = np.array([0, 0.62, 0.78]) / np.hypot(0.62, 0.78)

@@ -21,7 +21,7 @@ import numpy as np
 from cembench.core import atomic
 from cembench.core.errors import MeshError, RecordError
 from cembench.core.names import file_name
-from cembench.core.notices import Notice, NoticeKind, notice_of_old
+from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -96,8 +96,6 @@ def read(mesh_type: type[M], path: Path) -> M | None:
 def _notices(data: Mapping[str, Any]) -> tuple[Notice, ...]:
     """Return the notices of a file; ValueError for an unknown kind or inconsistent numbers."""
     texts = [str(text) for text in data["notices"]]
-    if "notice_kinds" not in data:
-        return tuple(map(notice_of_old, texts))
     kinds = [NoticeKind(str(kind)) for kind in data["notice_kinds"]]
     return tuple(Notice(kind, text) for kind, text in zip(kinds, texts, strict=True))
 

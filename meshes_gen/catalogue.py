@@ -186,23 +186,7 @@ def _registered(name: str) -> Callable[..., DiskMesh]:
     return declare(make)
 
 
-nefertiti = _registered("nefertiti-stand-in")
-cowboy_hat = _registered("cowboy-hat-stand-in")
-chinese_vase = _registered("chinese-vase-stand-in")
-bourbon_bottle = _registered("bourbon-bottle-stand-in")
-foot = _registered("foot-stand-in")
-chinese_lion = _registered("chinese-lion-stand-in")
-david_head = _registered("david-head-stand-in")
-stanford_bunny = _registered("stanford-bunny-stand-in")
-human_brain = _registered("human-brain-stand-in")
-ho_pouting_face = _registered("ho-pouting-face-stand-in")
-ho_neutral_face = _registered("ho-neutral-face-stand-in")
-left_hand = _registered("left-hand-stand-in")
-statue_of_liberty = _registered("statue-of-liberty-stand-in")
-liu_neutral_face = _registered("liu-neutral-face-stand-in")
-liu_smile_face = _registered("liu-smile-face-stand-in")
-liu_pouting_face = _registered("liu-pouting-face-stand-in")
-liu_wry_face = _registered("liu-wry-face-stand-in")
-isis_statue = _registered("isis-statue-stand-in")
-bimba_statue = _registered("bimba-statue-stand-in")
-knit_cap_man = _registered("knit-cap-man-stand-in")
+#: Each under the name of its stand-in, as its entry point has it: ``nefertiti``, ``cowboy_hat``.
+globals().update(
+    {name.removesuffix("-stand-in").replace("-", "_"): _registered(name) for name in BODIES}
+)

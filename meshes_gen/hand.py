@@ -38,9 +38,8 @@ def left_hand_body(seed: int = 0) -> Body:
         d = box(p, (0, 0, 0.22), (0.42, 0.15, 0.46), 0.14)
         d = join(d, ellipsoid(p, (0.22, -0.10, 0.05), (0.20, 0.15, 0.30)), 0.12)
         d = join(d, ellipsoid(p, (-0.25, -0.08, 0.05), (0.16, 0.13, 0.33)), 0.12)
-        d = join(
-            d, tube(p, [(0, 0.0, -0.1), (0, 0.02, -0.7), (0, 0.02, -1.5)], [0.29, 0.23, 0.28]), 0.2
-        )
+        arm = [(0, 0.0, -0.1), (0, 0.02, -0.7), (0, 0.02, -1.5)]
+        d = join(d, tube(p, arm, [0.29, 0.23, 0.28]), 0.2)
         for name, joints in FINGERS.items():
             finger = tube(p, joints, RADII[name], 0.02)
             d = join(d, finger, 0.05 if name != "thumb" else 0.12)

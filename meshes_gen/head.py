@@ -125,10 +125,8 @@ class Head:
                 if near.any():
                     d[near] = join(d[near], self._ear(p[near], s), 0.06)
         if self.neck:
-            throat = tube(
-                p, [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)], [0.43, 0.42, 0.5]
-            )
-            d = join(d, throat, 0.15)
+            throat = [(0, 0.22, -0.55), (0, 0.30, -1.3), (0, 0.36, -2.2)]
+            d = join(d, tube(p, throat, [0.43, 0.42, 0.5]), 0.15)
         return d
 
     def _features(self, p: Real, d: Real) -> Real:

@@ -17,7 +17,7 @@ from .faces import HO, face_body, mask
 from .head import NEUTRAL, Head
 from .implicit import Body, ellipsoid, sphere
 from .levers import with_levers
-from .remesh import has_remeshing_filter, mesh_of
+from .remesh import edge_length, has_remeshing_filter, mesh_of
 from .rows import ROWS
 
 #: Polar angle of the cap's rim, of the holes' centres, and the holes' radius; degrees.
@@ -70,15 +70,8 @@ def holed_cap(
     rims = 2 * np.pi * (np.sin(np.deg2rad(CAP)) + holes * np.sin(np.deg2rad(HOLE)))
     area = 2 * np.pi * (1 - np.cos(np.deg2rad(CAP)))
     area -= holes * 2 * np.pi * (1 - np.cos(np.deg2rad(HOLE)))
-    boundary = round(rims / np.sqrt(4 * area / (np.sqrt(3) * faces)))
-    boundary += (faces - boundary) % 2
-    parameters = {"faces": faces, "holes": holes, "remeshing_filter": has_remeshing_filter()}
-    return cached(
-        HoledMesh,
-        "holed-cap",
-        parameters,
-        lambda: mesh_of(HoledMesh, body, faces, boundary, name="holed-cap"),
-    )
+    boundary = round(rims / edge_length(area, faces))
+    return _made("holed-cap", body, faces, boundary, holes=holes)
 
 
 @surface_family(
@@ -104,11 +97,13 @@ def ho_face_with_holes(
 
     body = Body(whole.f, keep, whole.lower, whole.upper, whole.cells, loops=4)
     boundary = round(1.5 * ROWS["ho-neutral-face-stand-in"].boundary_at(faces))
+    return _made("ho-face-with-holes", body, faces, boundary, seed=seed)
+
+
+def _made(name: str, body: Body, faces: int, boundary: int, **more: int) -> HoledMesh:
+    """Return the cached surface of a body, with boundary vertices of the required parity."""
     boundary += (faces - boundary) % 2
-    parameters = {"faces": faces, "seed": seed, "remeshing_filter": has_remeshing_filter()}
+    parameters = {"faces": faces, "remeshing_filter": has_remeshing_filter(), **more}
     return cached(
-        HoledMesh,
-        "ho-face-with-holes",
-        parameters,
-        lambda: mesh_of(HoledMesh, body, faces, boundary, name="ho-face-with-holes"),
+        HoledMesh, name, parameters, lambda: mesh_of(HoledMesh, body, faces, boundary, name=name)
     )

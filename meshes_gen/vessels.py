@@ -42,13 +42,8 @@ def chinese_vase_body(seed: int = 0) -> Body:
         d = meet(d, -z, 0.05)
         for s in (-1, 1):  # lugs on the neck without holes, so the surface stays a disk
             lug = ring(p, (0.36 * s, 0, 2.72), (0, 1, 0), 0.13, 0.085)
-            d = join(
-                d,
-                np.minimum(
-                    lug, np.linalg.norm((p - (0.36 * s, 0, 2.72)) / (1, 0.45, 1), axis=1) - 0.14
-                ),
-                0.05,
-            )
+            core = np.linalg.norm((p - (0.36 * s, 0, 2.72)) / (1, 0.45, 1), axis=1) - 0.14
+            d = join(d, np.minimum(lug, core), 0.05)
         return d
 
     return Body(f, halfspace((0, 0, -1), -3.3), (-1.25, -1.25, -0.15), (1.25, 1.25, 3.6), 150)
@@ -80,9 +75,8 @@ def bourbon_bottle_body(seed: int = 0) -> Body:
         wave = 0.20 + 0.07 * np.cos(5 * star)
         medal = np.hypot(p[:, 0], z - 1.0) - wave
         d = d - 0.05 / (1 + np.exp(np.clip(medal / 0.02, -30, 30))) * (p[:, 1] < 0)
-        d = carve(
-            d, np.linalg.norm((p - (0, 0, -0.12)) / (1.0, 0.8, 0.55), axis=1) * 0.55 - 0.2, 0.05
-        )
+        hollow = np.linalg.norm((p - (0, 0, -0.12)) / (1.0, 0.8, 0.55), axis=1) * 0.55 - 0.2
+        d = carve(d, hollow, 0.05)
         return d - 0.004 * glass(p)
 
     return Body(f, halfspace((0, 0, -1), -3.36), (-0.9, -0.75, -0.15), (0.9, 0.75, 3.6), 170)

@@ -86,12 +86,3 @@ class Notice:
 def of_kind(kind: NoticeKind, notices: Iterable[Notice]) -> tuple[Notice, ...]:
     """Return the notices of one kind, in order."""
     return tuple(notice for notice in notices if notice.kind is kind)
-
-
-def notice_of_old(text: str) -> Notice:
-    """Return the notice for a plain text, as files written before notices had kinds hold it.
-
-    This is the only place that looks at the wording of a message, and only at the old wording.
-    """
-    breaks_definition_1 = text.startswith("Definition 1")
-    return Notice(NoticeKind.DEFINITION_1 if breaks_definition_1 else NoticeKind.OTHER, text)
