@@ -15,7 +15,7 @@ from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.parameterization import Parameterization
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
@@ -112,10 +112,7 @@ class _Packing:
             inradius = np.sqrt(R.prod(axis=1) / R.sum(axis=1))
             weights = inradius[:, None] / (R.sum(axis=1, keepdims=True) - R)
             A, right = self._pattern.dirichlet(weights, ~self.inside, z)
-        if self._cholesky is None:
-            self._cholesky = Cholesky(A)
-        else:
-            self._cholesky.update(A)
+        self._cholesky = factor_like(self._cholesky, A)
         z[self.inside] = self._cholesky.solve(right)
         return z
 

@@ -8,10 +8,10 @@ import numpy as np
 from pydantic import Field
 
 from cembench.conformal.balancing import moebius_centred
-from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import by_rows, laplacian
+from cembench.conformal.laplacian import by_rows
 from cembench.conformal.spherical import balanced_planar_map
 from cembench.conformal.stereographic import to_sphere
 from cembench.core.clock import phase
@@ -56,13 +56,7 @@ def gu_yau(
     between the copies is put on the unit circle and the interior is solved for once more, as in
     QIEM. Remaining folds are repaired as in CEM (`fold_repairs`).
     """
-    if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
-    L = laplacian(mesh, delaunay=delaunay)
-    double = doubled(mesh)
-    with phase("assembly"):
-        L_double = doubled_laplacian(L, double)
-        V = double.on_both(mesh.V)
+    L, double, L_double, V = doubled_surface(mesh, delaunay=delaunay)
     S = to_sphere(balanced_planar_map(L_double, V, double.F), "north")
     rows, mass = by_rows(L_double), np.ones(len(S))
     diagonal = L_double.diagonal()

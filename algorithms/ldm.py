@@ -11,10 +11,9 @@ from cembench.conformal.beltrami import (
     linear_beltrami_solver,
     weights_of_map,
 )
-from cembench.conformal.doubling import DoubledSurface, doubled, doubled_laplacian
+from cembench.conformal.doubling import DoubledSurface, doubled_surface
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.moebius import three_point_map
 from cembench.conformal.planar import polygon_area
@@ -88,13 +87,7 @@ def map_numbered(
         As for `ldm`.
 
     """
-    if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
-    L = laplacian(mesh, delaunay=delaunay)
-    double = doubled(mesh)
-    with phase("assembly"):
-        L_double = doubled_laplacian(L, double)
-        V = double.on_both(mesh.V)
+    L, double, L_double, V = doubled_surface(mesh, delaunay=delaunay)
     z = balanced_planar_map(L_double, V, np.roll(double.F, mesh.m if mirrored else 0, axis=0))
     w = _corrected_at_north(double, V, z, L_double if delaunay else None)
     z = _laid_on_disk(mesh, w[: mesh.n], first)

@@ -9,10 +9,9 @@ import scipy
 from pydantic import Field
 
 from cembench.conformal.balancing import moebius_centred
-from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.fold_repair import accepted_repair
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import with_last_resort
 from cembench.conformal.planar import fitted_circle, polygon_area
 from cembench.conformal.spherical import balanced_planar_map
@@ -21,7 +20,7 @@ from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
@@ -67,13 +66,7 @@ def qiem(
     recorded energies are half of the sphere's, minus 2 pi. `delaunay` takes the weights of the
     intrinsic Delaunay triangulation.
     """
-    if not len(mesh.interior):
-        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
-    L = laplacian(mesh, delaunay=delaunay)
-    double = doubled(mesh)
-    with phase("assembly"):
-        L_double = doubled_laplacian(L, double)
-        V = double.on_both(mesh.V)
+    L, double, L_double, V = doubled_surface(mesh, delaunay=delaunay)
     z = balanced_planar_map(L_double, V, double.F)
     S, energies = _flow(L_double, to_sphere(z, "north"), tolerance, max_iterations)
     z = harmonic_extension(L, mesh.boundary, boundary_on_circle(mesh, S))
@@ -141,10 +134,7 @@ class _Step:
             self._A.data[:] = dt * self._L.data
             self._A.data[self._diagonal] += 1 - dt * D
         try:
-            if self._cholesky is None:
-                self._cholesky = Cholesky(self._A)
-            else:
-                self._cholesky.update(self._A)
+            self._cholesky = factor_like(self._cholesky, self._A)
             return self._cholesky.solve(S)
         except NotPositiveDefinite:
             return None

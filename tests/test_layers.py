@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_170,
     "mesh": 7_060,
     "linear_algebra": 1_550,
-    "conformal": 6_800,
+    "conformal": 6_790,
     "registry": 970,
     "results": 5_400,
     "running": 7_670,

@@ -15,7 +15,7 @@ from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.core.parameterization import Parameterization
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 
 
@@ -119,10 +119,7 @@ class Angles:
                 np.einsum("trc,tc->tr", J, moved) - to_triangle * (free / total)[:, None]
             )
         try:
-            if self._cholesky is None:
-                self._cholesky = Cholesky(self._A)
-            else:
-                self._cholesky.update(self._A)
+            self._cholesky = factor_like(self._cholesky, self._A)
         except NotPositiveDefinite as error:
             thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
             raise AlgorithmFailed(

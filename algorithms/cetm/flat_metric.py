@@ -17,7 +17,7 @@ from cembench.conformal.discrete_metric import (
 from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 
 #: A step is taken if the energy's upward slope at its end is at most this share of the slope at its
 #: start: the energy is convex, so its minimum along the step is then near the end or beyond.
@@ -110,10 +110,7 @@ def flat_metric(
     while history[-1] > tolerance and len(history) <= max_iterations:
         with phase("assembly"):
             A = pattern.block(half_cotangents_of(alpha, broken))
-        if cholesky is None:
-            cholesky = Cholesky(A)
-        else:
-            cholesky.update(A)
+        cholesky = factor_like(cholesky, A)
         step = np.zeros(n)
         step[kept] = -cholesky.solve(gradient)
         with phase("angles"):

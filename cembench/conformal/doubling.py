@@ -9,6 +9,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from cembench.conformal.laplacian import laplacian
+from cembench.core.arrays import Real
+from cembench.core.clock import phase
+from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
 
 
@@ -56,6 +60,18 @@ def doubled(mesh: DiskMesh) -> DoubledSurface:
     return DoubledSurface(
         np.concatenate([mesh.F, mirror[mesh.F][:, ::-1]]), mirror, mesh.n + len(mesh.interior)
     )
+
+
+def doubled_surface(
+    mesh: DiskMesh, *, delaunay: bool = False
+) -> tuple[scipy.sparse.csc_array, DoubledSurface, scipy.sparse.csc_array, Real]:
+    """Return a surface's Laplacian, its double, and the double's Laplacian and vertices."""
+    if not len(mesh.interior):
+        raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")
+    L = laplacian(mesh, delaunay=delaunay)
+    double = doubled(mesh)
+    with phase("assembly"):
+        return L, double, doubled_laplacian(L, double), double.on_both(mesh.V)
 
 
 def doubled_laplacian(L: scipy.sparse.csc_array, double: DoubledSurface) -> scipy.sparse.csc_array:

@@ -361,6 +361,14 @@ class Cholesky:
         return _factor(self._how.backend, block, None)
 
 
+def factor_like(earlier: Cholesky | None, A: scipy.sparse.sparray) -> Cholesky:
+    """Return a factor of A; one of an `earlier` matrix of the same pattern turns to A."""
+    if earlier is None:
+        return Cholesky(A)
+    earlier.update(A)
+    return earlier
+
+
 class Among:
     """Solve systems whose right-hand sides are zero outside some rows; made by `Cholesky.among`.
 

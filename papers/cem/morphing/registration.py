@@ -25,7 +25,7 @@ from cembench.conformal.planar import signed_areas
 from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
-from cembench.linear_algebra.cholesky import Cholesky
+from cembench.linear_algebra.cholesky import Cholesky, factor_like
 from cembench.mesh.triangle_mesh import DiskMesh
 
 Ints = NDArray[np.int64]
@@ -192,10 +192,7 @@ def _minimisers(
     def minimiser(lam: float) -> Complex:
         nonlocal factor
         A = sparse.csc_array(L_ii + sparse.diags_array(lam * pull[i]))
-        if factor is None:
-            factor = Cholesky(A)
-        else:
-            factor.update(A)
+        factor = factor_like(factor, A)
         image = z.copy()
         image[i] = factor.solve(right + lam * pulled[i])
         return image
