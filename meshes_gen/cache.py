@@ -12,7 +12,6 @@ import json
 import zipfile
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -22,6 +21,7 @@ from cembench.core import atomic
 from cembench.core.errors import MeshError, RecordError
 from cembench.core.names import file_name
 from cembench.core.notices import Notice, NoticeKind
+from cembench.core.version import version_of
 from cembench.mesh.datasets import cache_directory
 from cembench.mesh.triangle_mesh import TriangleMesh
 
@@ -29,13 +29,6 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 GENERATOR_VERSION = 1
 
 M = TypeVar("M", bound=TriangleMesh)
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def content_key(name: str, parameters: Mapping[str, Any]) -> str:
@@ -48,7 +41,7 @@ def content_key(name: str, parameters: Mapping[str, Any]) -> str:
         "generator": GENERATOR_VERSION,
         "name": name,
         "parameters": dict(parameters),
-        "libraries": {package: _version(package) for package in libraries},
+        "libraries": {package: version_of(package) for package in libraries},
     }
     text = json.dumps(content, sort_keys=True, default=str)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -32,6 +32,12 @@ class Edges:
         """Whether each edge has a single triangle."""
         return self.face[:, 1] < 0
 
+    def rim(self, n: int) -> NDArray[np.bool_]:
+        """Return whether each of the n vertices is on the boundary."""
+        mask = np.zeros(n, dtype=bool)
+        mask[self.ends[self.on_boundary]] = True
+        return mask
+
 
 def edges_of(F: Indices, n: int) -> Edges:
     """Return the edges of the triangles F, with the triangles on each side."""
@@ -56,10 +62,7 @@ def edges_of(F: Indices, n: int) -> Edges:
 
 def boundary_mask(F: Indices, n: int) -> NDArray[np.bool_]:
     """Whether each of the n vertices is on the boundary."""
-    edges = edges_of(F, n)
-    mask = np.zeros(n, dtype=bool)
-    mask[edges.ends[edges.on_boundary]] = True
-    return mask
+    return edges_of(F, n).rim(n)
 
 
 def compact(V: Real, F: Indices) -> tuple[Real, Indices]:
@@ -147,8 +150,7 @@ def collapse(
     boundary vertices across the interior. At most `most` edges are collapsed.
     """
     n = len(V)
-    bound = np.zeros(n, dtype=bool)
-    bound[edges.ends[edges.on_boundary]] = True
+    bound = edges.rim(n)
     ends, rim = edges.ends[chosen], edges.on_boundary[chosen]
     allowed = rim | ~bound[ends].all(axis=1)
     ends, rim, length = ends[allowed], rim[allowed], length[allowed]

@@ -245,8 +245,7 @@ def relax(V: Real, F: Indices, shape: Shape, reach: float, strength: float = 0.6
     n = len(V)
     edges = edges_of(F, n)
     ends = edges.ends[edges.on_boundary]
-    rim = np.zeros(n, dtype=bool)
-    rim[ends] = True
+    rim = edges.rim(n)
     move = mean_of_neighbours(V, F) - V
     normal = vertex_normals(V, F)
     move -= normal * (move * normal).sum(axis=1, keepdims=True)
@@ -507,8 +506,7 @@ def break_delaunay(V: Real, F: Indices, seed: int, share: float) -> Indices:
         if missing <= 0.02 * share * len(weight):
             break
         flipped = quads.flipped_weight(V)
-        rim = np.zeros(n, dtype=bool)
-        rim[edges.ends[edges.on_boundary]] = True
+        rim = edges.rim(n)
         mild = (weight >= 0) & (flipped < -1e-3) & (flipped > -0.8) & ~quads.folds(V)
         mild &= ~rim[quads.p] & ~rim[quads.q] & ~rim[quads.i] & ~rim[quads.j]
         candidates = np.flatnonzero(mild)

@@ -68,12 +68,12 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 2_170,
-    "mesh": 7_060,
+    "mesh": 7_030,
     "linear_algebra": 1_550,
     "conformal": 6_790,
     "registry": 970,
     "results": 5_400,
-    "running": 7_670,
+    "running": 7_640,
     "drawing": 1_500,
     "report": 8_230,
     "validation": 2_380,

@@ -123,9 +123,8 @@ class Angles:
         except NotPositiveDefinite as error:
             thin = np.rad2deg(float(np.minimum(angles, np.pi - angles).min()))
             raise AlgorithmFailed(
-                f"the angle constraints are linearly dependent in double precision ({error}): "
-                "the sharpest "
-                f"angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
+                f"the angle constraints are linearly dependent in double precision ({error}): the "
+                f"sharpest angle is {thin:.2g} degrees. Remesh the needles, or use bff-free or lscm"
             ) from None
         y = self._cholesky.solve(b)
         with phase("assembly"):

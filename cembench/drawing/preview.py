@@ -152,8 +152,7 @@ def _check(mesh: TriangleMesh, uv: Complex, size: tuple[int, int]) -> None:
     if size[0] < LEAST[0] or size[1] < LEAST[1] or compose.panel_side(size) < 64:
         raise ParameterError(
             f"size {size[0]} x {size[1]} is too small for two panels and their captions; allowed "
-            "is "
-            f"{LEAST[0]} x {LEAST[1]} and above."
+            f"is {LEAST[0]} x {LEAST[1]} and above."
         )
 
 

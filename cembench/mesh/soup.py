@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import re
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Self, TypeVar
@@ -321,6 +323,17 @@ def no_faces(n: int) -> MeshError:
         "point cloud, was cut short, or is of another format than its name says; export or "
         "download it again, as a surface."
     )
+
+
+@contextmanager
+def reading_as(kind: str) -> Iterator[None]:
+    """Turn whatever a library raises on damaged bytes, or its exit, into an error of a file."""
+    try:
+        yield
+    except MemoryError:
+        raise
+    except (SystemExit, Exception):  # meshio calls sys.exit on some damaged files
+        raise damaged(f"it cannot be read as {kind}") from None
 
 
 def damaged(what: str) -> MeshError:

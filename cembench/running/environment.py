@@ -9,11 +9,11 @@ import platform
 import subprocess
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 from cembench.core.names import printable
+from cembench.core.version import installed_version, version_of
 
 #: Variables that set the number of threads; set them before numerical libraries are loaded.
 THREAD_VARIABLES = (
@@ -91,7 +91,7 @@ def describe_environment() -> dict[str, Any]:
 
     about: dict[str, Any] = {
         "machine": machine_name(),
-        "cembench": version("cembench"),
+        "cembench": installed_version(),
         "git": _git_state(),
         "python": platform.python_version(),
         "platform": platform.platform(),
@@ -100,7 +100,7 @@ def describe_environment() -> dict[str, Any]:
         "hardware_threads": psutil.cpu_count(),
         "memory_bytes": psutil.virtual_memory().total,
         "allocator": _allocator(),
-        "libraries": {name: _version(name) for name in _LIBRARIES},
+        "libraries": {name: version_of(name) for name in _LIBRARIES},
         "blas": sorted(
             f"{pool['internal_api']} {pool.get('version') or '?'} "
             f"({pool.get('architecture', 'unknown')})"
@@ -122,13 +122,6 @@ def _allocator() -> dict[str, str | None]:
         # Without it the kernel took 1.35 times as long in processes that had freed no large array.
         "reference_kernel": "in one state of the heap",
     }
-
-
-def _version(package: str) -> str | None:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return None
 
 
 def _cpu_model() -> str:

@@ -128,7 +128,8 @@ def judged_check(
     except MemoryError as error:
         return outcome_of_error(error, mesh)
     except Exception as error:
-        about, more = {}, [_no_metrics(error)]
+        message = f"its metrics cannot be computed: {describe_error(error)}"
+        about, more = {}, [Fault(kind=FaultKind.NO_METRICS, detail=message)]
     problems = [*more, *called.faults]
     outcome = not_ok("invalid", *problems) if problems else Outcome(status="ok")
     about["notes"] = (*about.get("notes", ()), *called.notes)
@@ -302,11 +303,6 @@ def _warnings_ignored() -> Iterator[None]:
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
-
-
-def _no_metrics(error: Exception) -> Fault:
-    message = f"its metrics cannot be computed: {describe_error(error)}"
-    return Fault(kind=FaultKind.NO_METRICS, detail=message)
 
 
 def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:

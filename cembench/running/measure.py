@@ -419,17 +419,14 @@ def _timed(
         while len(by_cell[number].calls) < cells[number][0].untimed:
             once(number, counts=False)
     if len(cells) == 1:
-        while _wants_more(by_cell[0]):
+        timed = by_cell[0]
+        while len(timed.counted) < ENOUGH_CALLS and timed.seconds < ENOUGH_SECONDS:
             once(0, counts=True)
     else:
         for number in _shuffled([n for n in short for _ in range(_calls_expected(by_cell[n]))]):
             once(number, counts=True)
     gc.unfreeze()
     return by_cell, everything
-
-
-def _wants_more(timed: TimedCalls) -> bool:
-    return len(timed.counted) < ENOUGH_CALLS and timed.seconds < ENOUGH_SECONDS
 
 
 def _calls_expected(timed: TimedCalls) -> int:

@@ -43,7 +43,7 @@ def test_key_depends_on_everything(monkeypatch: pytest.MonkeyPatch) -> None:
     }
     monkeypatch.setattr(cache, "GENERATOR_VERSION", cache.GENERATOR_VERSION + 1)
     keys.add(cache.content_key("a", {"faces": 1}))
-    monkeypatch.setattr(cache, "_version", lambda package: "0")
+    monkeypatch.setattr(cache, "version_of", lambda package: "0")
     keys.add(cache.content_key("a", {"faces": 1}))
     assert len(keys) == 5
 

@@ -81,19 +81,14 @@ def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
 
 def _soup(file: Path, *, uv: bool) -> Soup:
     try:
-        arrays = read_arrays(file, ("V", "corners", "sizes", "notices", *(_UV if uv else ())))
+        arrays: dict[str, Any] = read_arrays(
+            file, ("V", "corners", "sizes", "notices", *(_UV if uv else ()))
+        )
     except RecordError as error:
         raise MeshError(str(error)) from error
-    pairs = json.loads(str(arrays["notices"]))
+    pairs = json.loads(str(arrays.pop("notices")))
     notices = tuple(Notice(NoticeKind(kind), text) for kind, text in pairs)
-    return Soup(
-        arrays["V"],
-        arrays["corners"],
-        arrays["sizes"],
-        notices=notices,
-        uv=arrays.get("uv"),
-        uv_index=arrays.get("uv_index"),
-    )
+    return Soup(**arrays, notices=notices)
 
 
 def _main(module: str, reader: str, path: str, folder: str, options: str) -> int:

@@ -9,22 +9,18 @@ from typing import Any
 import numpy as np
 
 from cembench.core.errors import MeshError
-from cembench.mesh.soup import Soup, damaged
+from cembench.mesh.soup import Soup, damaged, reading_as
 
 
 def read(path: Path) -> Soup:
     """Read the points and the triangles of a GIFTI file."""
     nibabel: Any = importlib.import_module("nibabel")
 
-    try:
+    with reading_as("GIFTI"):
         image = nibabel.gifti.GiftiImage.from_bytes(path.read_bytes())
         points = image.get_arrays_from_intent("NIFTI_INTENT_POINTSET")
         triangles = image.get_arrays_from_intent("NIFTI_INTENT_TRIANGLE")
         V, F = ([np.asarray(one.data) for one in arrays] for arrays in (points, triangles))
-    except MemoryError:
-        raise
-    except Exception:  # whatever a library raises on damaged bytes
-        raise damaged("it cannot be read as GIFTI") from None
     if len(V) != 1 or len(F) != 1:
         raise MeshError(
             f"it holds {len(V)} sets of points and {len(F)} of triangles; one of each is needed. "
@@ -39,10 +35,6 @@ def read_freesurfer(path: Path) -> Soup:
     """Read a geometry file of FreeSurfer, such as `lh.pial`, of triangles or quadrangles."""
     nibabel: Any = importlib.import_module("nibabel")
 
-    try:
+    with reading_as("FreeSurfer geometry"):
         V, F = nibabel.freesurfer.read_geometry(path)
-    except MemoryError:
-        raise
-    except Exception:  # whatever a library raises on damaged bytes
-        raise damaged("it cannot be read as FreeSurfer geometry") from None
     return Soup.from_arrays(V, F, np.full(len(F), 3))

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -17,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.soup import Soup, Texture, columns, complex_of, damaged, in_single_precision
+from cembench.mesh.soup import Soup, Texture, columns, complex_of, in_single_precision, reading_as
 
 _FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
     5126, 5125, 34962, 34963, 10497, 9729, 9987,
@@ -32,13 +31,8 @@ def read(path: Path, *, uv: bool = False) -> Soup:
     """
     import trimesh
 
-    try:
-        scene = trimesh.load_scene(path, process=False)
-        pieces = scene.dump()
-    except MemoryError:
-        raise
-    except Exception:  # whatever a library raises on damaged bytes
-        raise damaged(f"it cannot be read as {path.suffix[1:].upper()}") from None
+    with reading_as(path.suffix[1:].upper()):
+        pieces = trimesh.load_scene(path, process=False).dump()
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
     notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):
@@ -103,12 +97,7 @@ class _File:
         """Add an array, and return the index of its accessor."""
         component = _FLOAT if values.dtype.kind == "f" else _UINT32
         view = self.view(values.tobytes(), target=target)
-        about = {
-            "bufferView": view,
-            "componentType": component,
-            "count": len(values),
-            "type": kind,
-        }
+        about = {"bufferView": view, "componentType": component, "count": len(values), "type": kind}
         if bounds:
             about |= {"min": values.min(axis=0).tolist(), "max": values.max(axis=0).tolist()}
         return self.add("accessors", about)
@@ -147,13 +136,12 @@ def _add(file: _File, surface: Soup, texture: Texture | None) -> None:
         "indices": file.array(surface.triangles.ravel().astype("<u4"), "SCALAR", _INDICES),
         "material": _material(file, texture if surface.uv is not None else None),
     }
-    mesh = file.add("meshes", {"name": _name(surface.name), "primitives": [primitive]})
-    node: dict[str, Any] = {"name": _name(surface.name), "mesh": mesh}
-    file.parts.setdefault("nodes", []).append(node | _moved(middle.tolist()))
-
-
-def _moved(middle: Sequence[float]) -> dict[str, Any]:
-    return {"translation": list(middle)} if any(middle) else {}
+    name = surface.name.encode("utf-8", "replace").decode()
+    node: dict[str, Any] = {"name": name}
+    node["mesh"] = file.add("meshes", {"name": name, "primitives": [primitive]})
+    if middle.any():
+        node["translation"] = middle.tolist()
+    file.parts.setdefault("nodes", []).append(node)
 
 
 def _material(file: _File, texture: Texture | None) -> int:
@@ -162,16 +150,7 @@ def _material(file: _File, texture: Texture | None) -> int:
     if texture is not None:
         if "images" not in file.parts:  # all surfaces share it
             file.add("images", {"bufferView": file.view(texture.png), "mimeType": "image/png"})
-        sampler = {
-            "magFilter": _LINEAR,
-            "minFilter": _MIPMAPS,
-            "wrapS": _REPEAT,
-            "wrapT": _REPEAT,
-        }
+        sampler = {"magFilter": _LINEAR, "minFilter": _MIPMAPS, "wrapS": _REPEAT, "wrapT": _REPEAT}
         source = {"sampler": file.add("samplers", sampler), "source": 0}
         surface["baseColorTexture"] = {"index": file.add("textures", source)}
     return file.add("materials", {"pbrMetallicRoughness": surface, "doubleSided": True})
-
-
-def _name(name: str) -> str:
-    return name.encode("utf-8", "replace").decode()

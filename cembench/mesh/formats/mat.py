@@ -13,7 +13,7 @@ import numpy as np
 
 from cembench.core.errors import MeshError
 from cembench.mesh.formats.arrays import UV_ARRAYS, soup_of_arrays, soup_of_uv
-from cembench.mesh.soup import Soup, damaged
+from cembench.mesh.soup import Soup, damaged, reading_as
 
 _HEADER_BYTES = 128
 
@@ -27,17 +27,12 @@ def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False)
     from scipy.io.matlab import matfile_version
 
     wanted = UV_ARRAYS if uv else arrays or ("v", "f")
-    try:
-        with warnings.catch_warnings(action="error"):
-            version, _ = matfile_version(path, appendmat=False)
-            shapes = {n: s for n, s, _ in whosmat(path, appendmat=False)} if version == 1 else {}
-            others = [name for name, shape in shapes.items() if shape[1:] in ((2,), (3,))]
-            chosen = wanted if uv or arrays or set(wanted) <= set(shapes) else (*wanted, *others)
-            found = loadmat(path, appendmat=False, variable_names=chosen) if shapes else {}
-    except MemoryError:
-        raise
-    except Exception:  # whatever scipy raises on damaged bytes
-        raise damaged("it cannot be read as MAT") from None
+    with reading_as("MAT"), warnings.catch_warnings(action="error"):
+        version, _ = matfile_version(path, appendmat=False)
+        shapes = {n: s for n, s, _ in whosmat(path, appendmat=False)} if version == 1 else {}
+        others = [name for name, shape in shapes.items() if shape[1:] in ((2,), (3,))]
+        chosen = wanted if uv or arrays or set(wanted) <= set(shapes) else (*wanted, *others)
+        found = loadmat(path, appendmat=False, variable_names=chosen) if shapes else {}
     if version != 1:
         raise MeshError(
             f"MATLAB files of version {'7.3' if version else '4'} are not supported. In MATLAB, "

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra, command
 from cembench.core.notices import Notice, NoticeKind
-from cembench.mesh.soup import Soup, columns, complex_of, damaged
+from cembench.mesh.soup import Soup, columns, complex_of, damaged, reading_as
 
 #: meshio's names of planar cells with corners in cyclic order.
 _POLYGONS = ("triangle", "quad", "polygon")
@@ -104,13 +104,9 @@ def read_by_meshio(path: Path) -> Soup:
     """Read the faces of a file of any format that meshio knows."""
     import meshio
 
-    try:
-        with redirect_stderr(StringIO()):  # it prints what its error says as well
-            mesh = meshio.read(path)
-    except MemoryError:
-        raise
-    except (SystemExit, Exception):  # meshio calls sys.exit on some damaged files
-        raise damaged(f"it cannot be read as {path.suffix[1:].upper()}") from None
+    # What its error says it prints as well.
+    with reading_as(path.suffix[1:].upper()), redirect_stderr(StringIO()):
+        mesh = meshio.read(path)
     return soup_of_cells(mesh.points, mesh.cells)
 
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 import psutil
+import scipy
 
 from cembench.core.clock import Timing
 from cembench.core.errors import NotThere, shortened
@@ -212,23 +213,15 @@ def small_mesh(like: TriangleMesh) -> TriangleMesh:
 
     It is a shallow cap of 63 triangles; for a surface with holes, of 54 triangles with a hole.
     """
-    holed = isinstance(like, HoledMesh)
-    angle = 2 * np.pi * (np.arange(AROUND)[None, :] + 0.5 * np.arange(RINGS)[:, None]) / AROUND
-    radius = (np.arange(RINGS) + 1.0)[:, None] / RINGS * np.ones(AROUND)
-    x, y = (radius * np.cos(angle)).ravel(), (radius * np.sin(angle)).ravel()
-    V = np.stack([x, y, 0.3 * (1 - x**2 - y**2)], axis=1)
-    k = np.arange(AROUND)
-    after = (k + 1) % AROUND
-    F = [
-        np.stack(three, axis=1) + AROUND * ring
-        for ring in range(RINGS - 1)
-        for three in ((k, k + AROUND, after), (after, k + AROUND, after + AROUND))
-    ]
-    if not holed:
-        V = np.concatenate([V, [[0.0, 0.0, 0.3]]])
-        F.append(np.stack([np.full(AROUND, len(V) - 1), k, after], axis=1))
-    kind = HoledMesh if holed else DiskMesh
-    return kind.from_arrays(V, np.concatenate(F), name="small")
+    kind = HoledMesh if isinstance(like, HoledMesh) else DiskMesh
+    ring, k = np.divmod(np.arange(RINGS * AROUND), AROUND)
+    z = (ring + 1) / RINGS * np.exp(2j * np.pi * (k + ring / 2) / AROUND)
+    if kind is DiskMesh:
+        z = np.append(z, 0)
+    plan = np.stack([z.real, z.imag], axis=1)
+    F = scipy.spatial.Delaunay(plan).simplices.astype(np.int64)
+    F = F[(F >= AROUND).any(axis=1)]  # the others fill the hole
+    return kind.from_arrays(np.column_stack([plan, 0.3 * (1 - np.abs(z) ** 2)]), F, name="small")
 
 
 @contextmanager

@@ -8,12 +8,11 @@ import json
 import shutil
 from dataclasses import asdict
 from functools import lru_cache
-from importlib.metadata import PackageNotFoundError
-from importlib.metadata import version as version_of
 from pathlib import Path
 
 from cembench.core.loading import sha256_of
 from cembench.core.program import Library, Program
+from cembench.core.version import version_of
 from cembench.registry import Algorithm
 from cembench.results.records import External
 
@@ -57,10 +56,7 @@ def _is_relative(name: str) -> bool:
 
 def library_version(library: Library) -> str | None:
     """Return the installed version of a library; None if it is unknown."""
-    try:
-        return version_of(library.package)
-    except PackageNotFoundError:
-        return None
+    return version_of(library.package)
 
 
 @lru_cache(maxsize=64)
