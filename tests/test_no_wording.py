@@ -10,7 +10,6 @@ ROOT = Path(__file__).parents[1]
 LOOKS = ("startswith", "endswith", "find", "index", "count", "partition", "split")
 #: What may look at words all the same: the file, what it looks for, and why.
 ALLOWED = {
-    ("cembench/core/notices.py", "Definition 1"): "records written before notices had kinds",
     ("cembench/running/environment.py", "model name"): "a key of /proc/cpuinfo",
     ("cembench/report/pictures.py", "A"): "a band of an image",
 }
