@@ -31,7 +31,7 @@ from cembench.conformal.laplacian import laplacian
 from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
-from cembench.conformal.untangling import untangled
+from cembench.conformal.untangling import FIRST, untangled
 from cembench.core.arrays import Complex, Mask
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -55,7 +55,7 @@ MEANS_RINGS, MEANS_ROUNDS = (0, 1, 2, 4), 8
 #: A valid map is good enough if its mean angle error is at most so many degrees above that of the
 #: algorithm's own map, and not above so many.
 ENOUGH, GOOD = 1.0, 10.0
-#: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
+#: Up to this size the whole interior is laid out again, twice, if the above costs more, or is bad.
 MOST_TRIANGLES = 20_000
 #: Newton steps for that, and for patches. They start at a valid map; two are often enough.
 LAYOUT_STEPS = 8
@@ -133,7 +133,7 @@ def valid_map(
         extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
         if own is not None and not (folded or crowded):
             return own, extras
-        choice = _Choice(mesh, own)
+        choice, enough = _Choice(mesh, own), 0.0
         if own is not None and folded:
             extras["before_repair"] = before = figures(mesh, own, folded)
             cheap = (1 + CHEAP) * before["angle_error_mean_deg"]
@@ -147,6 +147,8 @@ def valid_map(
                 _offer_convex_maps(choice, own)
         if own is None or crowded or (folded and not choice.reaches(BAD)):
             _offer_mean_value_maps(choice, own)
+        if not choice.reaches(min(enough, BAD)):
+            _offer_layouts(choice)
         extras["fold_repairs"] += choice.solves
         b = mesh.boundary
         moved = len(b) if own is None else int(np.count_nonzero(choice.z[b] != own[b]))
@@ -271,10 +273,7 @@ def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
 
 
 def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
-    """Offer maps with the image's mean value weights except near its folds, and one made of them.
-
-    That is the best one with its interior laid out anew, on surfaces where this takes a moment.
-    """
+    """Offer maps with the image's mean value weights except near its folds."""
     mesh = choice.mesh
     graph = vertex_graph(mesh.F, mesh.n)
     W = mean_value_weights(mesh.V, mesh.F)
@@ -286,9 +285,20 @@ def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
             return
         both = np.concatenate([folded, folded_triangles(z, mesh.F)])
         choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
-    if not choice.cost[0] and mesh.m <= MOST_TRIANGLES:
-        inside = ~_rings(graph, mesh.boundary, 0)
-        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS)
+
+
+def _offer_layouts(choice: _Choice) -> None:
+    """Offer the best map with its interior laid out anew, where this takes a moment.
+
+    First by steps that may fold on the way, which go farther, and then by steps that may not.
+    """
+    mesh = choice.mesh
+    inside = ~np.isin(np.arange(mesh.n), mesh.boundary)
+    for first in (FIRST, 0.0):
+        if choice.cost[0] or mesh.m > MOST_TRIANGLES or not inside.any():
+            return
+        graph = vertex_graph(mesh.F, mesh.n)
+        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS, first)
         choice.offer(laid_out, choice.by_means)
 
 
