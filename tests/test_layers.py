@@ -70,7 +70,7 @@ BUDGETS = {
     "core": 2_170,
     "mesh": 7_230,
     "linear_algebra": 1_540,
-    "conformal": 6_780,
+    "conformal": 6_800,
     "registry": 970,
     "results": 5_400,
     "running": 7_700,
