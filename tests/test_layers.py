@@ -75,7 +75,7 @@ BUDGETS = {
     "core": 2_050,
     "mesh": 6_880,
     "linear_algebra": 1_550,
-    "conformal": 6_650,
+    "conformal": 6_680,
     "registry": 960,
     "results": 4_880,
     "running": 7_650,

@@ -80,9 +80,9 @@ def direct_cem(
     the boundary is finally moved back towards it as far as that raises E_C by at most the share
     `back`; 0 keeps the least E_C. E_C counts a triangle by the area of its image; at most `even`
     more steps, each as dear as all of this, lower the mean angle error with weights that count all
-    triangles alike (`even_steps`): by default two on graded meshes, which have many needles
-    and areas that vary over decades, and none on others. Folds are repaired as in CEM
-    (`fold_repairs`); `last_resort` makes the map valid in any case.
+    triangles alike (`even_steps`): by default two on graded meshes, whose areas vary over decades,
+    and none on others. Folds are repaired as in CEM (`fold_repairs`); `last_resort` makes the map
+    valid in any case.
     """
     del even  # the decorator's
     L, flipped = delaunay_laplacian(mesh) if delaunay else (laplacian(mesh), 0.0)

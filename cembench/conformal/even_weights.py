@@ -36,8 +36,10 @@ DAMPING = 1e-6
 #: A step is halved so often at most.
 HALVINGS = 6
 #: A mesh is graded if this share of its triangles has an angle below so many degrees, and the
-#: natural logarithms of the areas have this standard deviation; then this many steps are taken.
-NEEDLES, THIN, SPREAD, USUAL_STEPS = 0.04, 5.0, 1.2, 2
+#: natural logarithms of the areas have this standard deviation; or if they have the larger one.
+NEEDLES, THIN, SPREAD, WIDE = 0.04, 5.0, 1.2, 1.5
+#: Then so many steps are taken.
+USUAL_STEPS = 2
 #: Every k-th triangle is looked at, these or a few more in all.
 SAMPLE = 4_000
 
@@ -127,7 +129,7 @@ def with_even_steps(method: Callable[..., Parameterization]) -> Callable[..., Pa
 
 
 def is_graded(mesh: DiskMesh) -> bool:
-    """Whether the areas of a mesh vary so much, and needles are so many, that E_C misses triangles.
+    """Whether the areas of a mesh vary so much that E_C misses triangles; needles tell sooner.
 
     Its least E_C may then have far larger angle errors than needed.
 
@@ -140,7 +142,8 @@ def is_graded(mesh: DiskMesh) -> bool:
     """
     dots, double_area = corner_products(mesh.V, mesh.F[:: max(1, mesh.m // SAMPLE)])
     needles = dots.max(axis=1) * np.tan(np.deg2rad(THIN)) > double_area
-    return bool(needles.mean() > NEEDLES and np.log(double_area).std() > SPREAD)
+    least = SPREAD if needles.mean() > NEEDLES else WIDE
+    return bool(np.log(double_area).std() > least)
 
 
 def _gradients(mesh: DiskMesh) -> Complex:

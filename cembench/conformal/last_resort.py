@@ -3,11 +3,12 @@
 A triangle whose three corners lie on arcs of length h has an area of about h^3 / 4, and its sign is
 lost in rounding below :data:`LEAST_ARC`; so arcs at folds are widened to that. The interior around
 the folds is laid out again in patches (:mod:`cembench.conformal.folds`). Where that is not enough,
-or costs angles, the surface's mean value weights place the vertices of small patches around the
-folds, a few times over. Where that costs angles too, every interior vertex becomes a mean of its
-neighbours with positive weights: mean value weights of the image, which reproduce it, except near
-folds, where they are the surface's. On a convex boundary such a map has no folds (Tutte 1963;
-Floater 2003). At worst the surface's weights are used everywhere.
+or costs angles, the surface's mean value weights place the vertices of the smallest patches around
+the folds that are left, and E_C is lowered there by steps that fold nothing. Where that costs
+angles too, every interior vertex becomes a mean of its neighbours with positive weights: mean value
+weights of the image, which reproduce it, except near folds, where they are the surface's. On a
+convex boundary such a map has no folds (Tutte 1963; Floater 2003). At worst the surface's weights
+are used everywhere.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ from cembench.conformal.laplacian import laplacian
 from cembench.conformal.mean_value import convex_extension, mean_value_weights
 from cembench.conformal.metrics import flipped_triangles
 from cembench.conformal.planar import folded_triangles
-from cembench.conformal.untangling import untangled
+from cembench.conformal.untangling import FIRST, untangled
 from cembench.core.arrays import Complex, Mask
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -42,19 +43,21 @@ DiskAlgorithm = Callable[..., Parameterization]
 
 #: Shortest arc, in radians, between the corners of a triangle that doubles resolve.
 LEAST_ARC = 3e-8
+#: Numbers of rings of vertices around the folds that are laid out again; more of them do not help.
+PATCH_RINGS = (1, 2)
 #: Numbers of rings of vertices around the folds that get the surface's weights.
 RINGS = (0, 2, 8)
 #: Patches are no remedy if more than this share of the triangles fold; they are all that is tried
 #: if they raise the mean angle error by no more than the share CHEAP.
 MOST_FOLDED, CHEAP = 0.3, 0.01
 #: Rings of vertices around folds that mean value weights place in patches, and how many times.
-MEANS_RINGS, MEANS_ROUNDS = (1, 2, 4), 5
+MEANS_RINGS, MEANS_ROUNDS = (0, 1, 2, 4), 8
 #: A valid map is good enough if its mean angle error is at most so many degrees above that of the
 #: algorithm's own map, and not above so many.
 ENOUGH, GOOD = 1.0, 10.0
-#: Up to this size the whole interior is laid out again if the above leaves folds or costs more.
+#: Up to this size the whole interior is laid out again, twice, if the above costs more, or is bad.
 MOST_TRIANGLES = 20_000
-#: Newton steps for that. It starts at a valid map, from where two are enough if it succeeds.
+#: Newton steps for that, and for patches. They start at a valid map; two are often enough.
 LAYOUT_STEPS = 8
 #: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
 #: everywhere.
@@ -130,20 +133,22 @@ def valid_map(
         extras: dict[str, Any] = {"fold_repairs": 0, "folded_before_repair": folded}
         if own is not None and not (folded or crowded):
             return own, extras
-        choice = _Choice(mesh, own)
+        choice, enough = _Choice(mesh, own), 0.0
         if own is not None and folded:
             extras["before_repair"] = before = figures(mesh, own, folded)
             cheap = (1 + CHEAP) * before["angle_error_mean_deg"]
             enough = max(cheap, min(before["angle_error_mean_deg"] + ENOUGH, GOOD))
             extras["fold_repairs"] = _offer_patches(choice, own, folded)
             if not choice.reaches(cheap):
-                _offer_means_in_patches(choice, own, folded)
+                _offer_means_in_patches(choice)
             if not choice.reaches(enough):
                 extras["fold_repairs"] += _offer_harmonic_map(choice, own, folded)
             if not choice.reaches(enough):
                 _offer_convex_maps(choice, own)
         if own is None or crowded or (folded and not choice.reaches(BAD)):
             _offer_mean_value_maps(choice, own)
+        if not choice.reaches(min(enough, BAD)):
+            _offer_layouts(choice)
         extras["fold_repairs"] += choice.solves
         b = mesh.boundary
         moved = len(b) if own is None else int(np.count_nonzero(choice.z[b] != own[b]))
@@ -217,24 +222,26 @@ def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
     z = _widened(mesh, own, stuck)
     if z is None:
         return 0
-    z, rounds = interior_without_folds(mesh, z)
+    z, rounds = interior_without_folds(mesh, z, PATCH_RINGS)
     choice.offer(z)
     return rounds
 
 
-def _offer_means_in_patches(choice: _Choice, own: Complex, folded: int) -> None:
-    """Offer maps with the surface's mean value weights around folds, all else as it is.
+def _offer_means_in_patches(choice: _Choice) -> None:
+    """Offer the best map with the surface's mean value weights around folds, all else as it is.
 
-    What folds at the edge of a patch makes it larger in the next round.
+    What folds at the edge of a patch makes it larger in the next round. Then E_C is lowered there
+    by steps that fold nothing. The smallest patches that do are taken.
     """
-    mesh = choice.mesh
-    if folded > MOST_FOLDED * mesh.m:
+    mesh, start = choice.mesh, choice.z
+    folded = folded_triangles(start, mesh.F)
+    if len(folded) > MOST_FOLDED * mesh.m:
         return
     graph, W = vertex_graph(mesh.F, mesh.n), mean_value_weights(mesh.V, mesh.F)
     inside = ~_rings(graph, mesh.boundary, 0)
     for rings in MEANS_RINGS:
-        near = _rings(graph, mesh.F[folded_triangles(own, mesh.F)], rings)
-        z = _widened(mesh, own, np.flatnonzero(near))
+        near = _rings(graph, mesh.F[folded], rings)
+        z = _widened(mesh, start, np.flatnonzero(near))
         if z is None or not (near & inside).any():
             return
         for _ in range(MEANS_ROUNDS):
@@ -247,8 +254,10 @@ def _offer_means_in_patches(choice: _Choice, own: Complex, folded: int) -> None:
             left = folded_triangles(z, mesh.F)
             if not len(left):
                 choice.offer(z, int(free.sum()))
-                break
-            near |= _rings(graph, mesh.F[left], rings)
+                lowered, _ = untangled(mesh, z, free, graph, LAYOUT_STEPS, first=0.0)
+                choice.offer(lowered, int(free.sum()))
+                return
+            near |= _rings(graph, mesh.F[left], max(rings, 1))
 
 
 def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
@@ -264,10 +273,7 @@ def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
 
 
 def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
-    """Offer maps with the image's mean value weights except near its folds, and one made of them.
-
-    That is the best one with its interior laid out anew, on surfaces where this takes a moment.
-    """
+    """Offer maps with the image's mean value weights except near its folds."""
     mesh = choice.mesh
     graph = vertex_graph(mesh.F, mesh.n)
     W = mean_value_weights(mesh.V, mesh.F)
@@ -279,9 +285,20 @@ def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
             return
         both = np.concatenate([folded, folded_triangles(z, mesh.F)])
         choice.offer_means(z, _rings(graph, mesh.F[both], rings), W)
-    if not choice.cost[0] and mesh.m <= MOST_TRIANGLES:
-        inside = ~_rings(graph, mesh.boundary, 0)
-        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS)
+
+
+def _offer_layouts(choice: _Choice) -> None:
+    """Offer the best map with its interior laid out anew, where this takes a moment.
+
+    First by steps that may fold on the way, which go farther, and then by steps that may not.
+    """
+    mesh = choice.mesh
+    inside = ~np.isin(np.arange(mesh.n), mesh.boundary)
+    for first in (FIRST, 0.0):
+        if choice.cost[0] or mesh.m > MOST_TRIANGLES or not inside.any():
+            return
+        graph = vertex_graph(mesh.F, mesh.n)
+        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS, first)
         choice.offer(laid_out, choice.by_means)
 
 

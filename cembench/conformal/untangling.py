@@ -48,6 +48,7 @@ def untangled(
     free: NDArray[np.bool_],
     graph: scipy.sparse.csr_array,
     steps: int = STEPS,
+    first: float = FIRST,
 ) -> tuple[Complex, Indices]:
     """Lay out the free vertices of a planar map without folds, if possible.
 
@@ -64,6 +65,8 @@ def untangled(
         Which vertices share an edge.
     steps : int
         Maximal number of Newton steps.
+    first : float
+        The first eps; with 0 a map without folds keeps having none.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def untangled(
     """
     patches = _Patches(mesh, z, free, graph)
     moving = z[patches.vertices]
-    eps = np.full(patches.count, FIRST)
+    eps = np.full(patches.count, first)
     for _ in range(steps):
         depth = np.maximum(-patches.least(moving), 0)
         eps = np.maximum(DECAY * eps, np.hypot(LAST, DEPTH * depth))

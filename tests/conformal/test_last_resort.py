@@ -7,12 +7,18 @@ from cembench.algorithms.cem import cem
 from cembench.algorithms.cetm.flips import cetm_flips
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.surfaces.flat_disk import flat_disk
+from cembench.surfaces.tin import tin
 
 from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.last_resort import LEAST_ARC, valid_map
-from cembench.conformal.metrics import MapFigures, flipped_triangles, is_disk_map
+from cembench.conformal.metrics import (
+    MapFigures,
+    all_metrics,
+    flipped_triangles,
+    is_disk_map,
+)
 from cembench.conformal.planar import turns
 from cembench.conformal.untangling import _Patches, untangled
 from cembench.core.notices import NoticeKind
@@ -118,11 +124,21 @@ def test_the_whole_interior_is_laid_out_in_few_steps_or_not_at_all(seed, monkeyp
     mesh = DiskMesh.from_arrays(*pinched_boundary(np.random.default_rng(seed)))
     steps, step = [], _Patches.newton_step
 
-    def counted(*arguments):
+    def counted(*arguments, **more):
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(_Patches, "newton_step", lambda *k: steps.append(k) or step(*k))
-            return untangled(*arguments)
+            return untangled(*arguments, **more)
 
     monkeypatch.setattr("cembench.conformal.last_resort.untangled", counted)
     assert is_valid(mesh, direct_cem(mesh).uv)
-    assert len(steps) <= 8
+    assert len(steps) <= 3 * 8  # of patches, and twice of all
+
+
+def test_the_repair_of_a_survey_s_folds_keeps_the_energy():
+    mesh = tin(2_000, seed=20, twins=0.2, relief=1.0)
+    made = direct_cem(mesh, delaunay=False, back=0.0, even=0)
+    before = made.extras["before_repair"]
+    assert is_valid(mesh, made.uv)
+    assert before["flipped_triangles"] > 10
+    assert made.extras["last_resort"]["mean_value_vertices"] < 30
+    assert all_metrics(mesh, made.uv)["conformal_energy"] < 1.01 * before["conformal_energy"]

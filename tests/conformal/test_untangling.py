@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from cembench.algorithms.harmonic_tutte import harmonic_tutte
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench.conformal.harmonic import arc_length_circle, harmonic_extension
@@ -66,3 +67,16 @@ def test_patches_do_not_see_each_other():
     assert abs(both[a] - identity[a]) < 0.02
     assert both[a] == pytest.approx(alone[a], abs=0.01)
     np.testing.assert_array_equal(np.delete(both, [a, b]), np.delete(identity, [a, b]))
+
+
+def test_from_a_map_without_folds_no_step_folds_and_the_energy_falls():
+    mesh = gallery.crumpled_disk()
+    z = harmonic_tutte(mesh).uv
+    assert not len(folded_triangles(z, mesh.F))
+    free = np.ones(mesh.n, dtype=bool)
+    free[mesh.boundary] = False
+    graph, L = vertex_graph(mesh.F, mesh.n), laplacian(mesh)
+    for steps in (1, 8):
+        lower, _ = untangled(mesh, z, free, graph, steps, first=0.0)
+        assert not len(folded_triangles(lower, mesh.F))
+        assert np.vdot(lower, L @ lower).real < np.vdot(z, L @ z).real
