@@ -72,13 +72,13 @@ BUDGETS = {
     "linear_algebra": 1_540,
     "conformal": 6_780,
     "registry": 970,
-    "results": 5_400,
-    "running": 7_700,
+    "results": 5_520,
+    "running": 7_970,
     "drawing": 1_500,
-    "report": 8_230,
-    "validation": 2_380,
-    "api": 5_480,
-    "commands": 3_000,
+    "report": 8_320,
+    "validation": 2_330,
+    "api": 5_820,
+    "commands": 3_130,
 }
 
 

@@ -26,9 +26,8 @@ MODULES = {
     "benchmark": {"run": "api.benchmark:benchmark"},
     "report": {"report": "api.benchmark:report"},
     "reproduce": {"reproduce": "api.reproduce:reproduce"},
-    "run": {
-        verb: f"commands.run:{verb}" for verb in ("status", "show", "compare", "merge", "export")
-    },
+    "run": {verb: f"commands.run:{verb}" for verb in ("status", "show", "merge", "export")},
+    "compare": {"compare": "commands.compare:compare"},
     "submit": {
         "submit": "api.submissions:submit",
         **{verb: f"commands.submit:{verb}" for verb in ("submissions", "publish", "sign")},
