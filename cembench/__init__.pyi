@@ -7,6 +7,8 @@ from cembench.api.catalogue import catalogue as catalogue
 from cembench.api.catalogue import list_algorithms as list_algorithms
 from cembench.api.catalogue import list_surfaces as list_surfaces
 from cembench.api.catalogue import surface as surface
+from cembench.api.compare import VersionsCompared as VersionsCompared
+from cembench.api.compare import compare_versions as compare_versions
 from cembench.api.cut import cut as cut
 from cembench.api.fetch import PublicSurfaces as PublicSurfaces
 from cembench.api.fetch import fetch as fetch

@@ -36,6 +36,9 @@ ALLOWED = {
     "cembench/running/plugins.py:_main": "between processes, in a temporary folder",
     "cembench/running/sanitized_result.py:_extras": "pydantic_core.to_json gives text",
     "cembench/running/process.py": "the output of a process, in the scratch folder",
+    "cembench/running/relay.py:__call__": "between processes, in a temporary folder",
+    "cembench/running/version_server.py:mapped": "between processes, in a temporary folder",
+    "cembench/api/compare.py:compare_versions": "a plug-in in a temporary folder",
     "cembench/running/worker.py": "between processes, in the scratch folder",
     "cembench/running/memory.py": "a switch of the system, not a file",
 }

@@ -77,13 +77,13 @@ BUDGETS = {
     "linear_algebra": 1_550,
     "conformal": 6_680,
     "registry": 960,
-    "results": 4_880,
-    "running": 7_650,
+    "results": 5_000,
+    "running": 7_910,
     "drawing": 1_420,
-    "report": 7_680,
-    "validation": 2_370,
-    "api": 4_190,
-    "commands": 2_700,
+    "report": 7_780,
+    "validation": 2_320,
+    "api": 4_530,
+    "commands": 2_840,
 }
 
 

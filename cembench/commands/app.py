@@ -25,9 +25,8 @@ MODULES = {
     "benchmark": {"run": "api.benchmark:benchmark"},
     "report": {"report": "api.benchmark:report"},
     "reproduce": {"reproduce": "api.reproduce:reproduce"},
-    "run": {
-        verb: f"commands.run:{verb}" for verb in ("status", "show", "compare", "merge", "export")
-    },
+    "run": {verb: f"commands.run:{verb}" for verb in ("status", "show", "merge", "export")},
+    "compare": {"compare": "commands.compare:compare"},
     "paper": {"paper": "commands.paper:paper"},
     "validate": {"validate": "api.validate:validate"},
     "peers": {"peers": "commands.peers:peers"},

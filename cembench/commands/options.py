@@ -36,3 +36,9 @@ RequireSigned = Annotated[
         help="Refuse runs not signed by somebody in this file (ssh-keygen: ALLOWED SIGNERS).",
     ),
 ]
+Junit = Annotated[
+    Path | None,
+    typer.Option(
+        "--junit", metavar="FILE", help="Write the checks as JUnit's XML, for test viewers."
+    ),
+]

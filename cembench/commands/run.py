@@ -1,4 +1,4 @@
-"""The commands on existing runs: status, show, compare, merge and export."""
+"""The commands on existing runs: status, show, merge and export."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from cembench.core.overwriting import refuse_inputs
 from cembench.report.export_format import Format
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Sequence
 
     from cembench.results.merging import Conflict
     from cembench.results.records import Cell, Record
@@ -179,84 +179,6 @@ def _show_records(records: list[Record]) -> None:
             out.print(f"round {number:<3} {r.started_at}  {calls}")
         for words in filter(None, (outcome.cause, outcome.traceback)):
             out.print(words, soft_wrap=True)
-
-
-Compared = Annotated[Path, typer.Argument(help="A run's folder, or a report's.")]
-
-
-@app.command(
-    epilog="Examples:  cembench compare results/before results/after  ·  "
-    "cembench compare reports/paper results/mine"
-)
-def compare(
-    before: Compared, after: Compared, *, verify: Verify = False, as_json: Json = False
-) -> None:
-    """Show which cells became faster or slower from one run to another.
-
-    Seconds are divided by those of a reference kernel, which every round times;
-    this removes the machine's drift between the runs, as far as it affects the
-    kernel. The test is a rank-sum test at the 5 % level. To compare two
-    algorithms, measure both in one run; what the two runs say of that is compared
-    too. A report with its records.csv stands for its run.
-    """
-    from dataclasses import asdict
-
-    from cembench.report.run_tables import changes_table
-    from cembench.results.machines import COMPARED, differences
-    from cembench.results.multiple_testing import corrected
-    from cembench.results.runs_compared import compare_runs
-
-    (old, earlier, older), (new, later, more) = (_compared(one, verify) for one in (before, after))
-    changes = compare_runs(old, new)
-    if not changes:
-        raise RecordError(
-            f"{before} and {after} have no timed cell in common: the same algorithm with the same "
-            "parameters on the same surface, solves, backend and threads."
-        )
-    pairs = {(c.before["environment"], c.after["environment"]) for c in changes}
-    known = [(earlier[b], later[a]) for b, a in pairs if b in earlier and a in later]
-    differing = sorted({d for one, other in known for d in differences(one, other, COMPARED)})
-    if as_json:
-        together = corrected([c.comparison for c in changes])
-        rows = [
-            {
-                **{name: c.after[name] for name in ("mesh", "algorithm", "solves")},
-                **{"seconds_before": c.before["seconds"], "seconds_after": c.after["seconds"]},
-                **asdict(c.comparison),
-                **{"verdict_corrected": both.verdict, "drift": c.drift, "verdicts": c.verdicts},
-            }
-            for c, both in zip(changes, together, strict=True)
-        ]
-        print_json({"differences": differing, "superseded": [older, more], "cells": rows})
-    else:
-        out.print(changes_table(changes))
-    if older + more:
-        note(f"left out: {older + more} older records of cells measured again")
-    if differing:
-        warn("the runs were measured under different conditions; their seconds are not comparable")
-        for difference in differing:
-            warn(difference)
-    if not known:
-        note("whether the machines are alike is unknown: a report's records do not describe them")
-
-
-def _compared(
-    folder: Path, verify: bool
-) -> tuple[list[dict[str, Any]], Mapping[str, Mapping[str, Any]], int]:
-    """Return the rows of a run or a report, the run's environments, and how many it leaves out."""
-    from cembench.results.columns import rows
-    from cembench.results.comparison import latest
-    from cembench.results.report_records import has_records, read_rows
-    from cembench.results.store import Store
-    from cembench.results.verify import Depth, sound_records
-
-    if has_records(folder):
-        return read_rows(folder), {}, 0
-    store = Store(folder)
-    records = sound_records(store, Depth.everything if verify else Depth.records)
-    kept = {record.cell.key for record in latest(records)}
-    compared = [row for row in rows(records) if row["key"] in kept]
-    return compared, store.environments(), len(records) - len(compared)
 
 
 @app.command(epilog="Example:  cembench merge results/a results/b -o results/both")

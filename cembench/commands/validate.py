@@ -13,6 +13,7 @@ from cembench.commands.app import app
 from cembench.commands.console import SHOWN, Json, Markdown, out, print_json, split
 from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
+from cembench.commands.options import Junit
 from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
@@ -41,10 +42,7 @@ def validate(
     ] = [],  # noqa: B006
     mesh: Annotated[list[Path], typer.Option(help="Compare on this file. Repeatable.")] = [],  # noqa: B006
     markdown: Markdown = None,
-    junit: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Write the checks as JUnit's XML, for test viewers."),
-    ] = None,
+    junit: Junit = None,
     as_json: Json = False,
 ) -> None:
     """Print the verdict; exit with 1 if the solver is not valid, or not what is required."""
@@ -55,9 +53,9 @@ def validate(
             "with --command COMMAND."
         )
     if junit:
-        from cembench.validation.summaries import check_junit
+        from cembench.report.junit import check_junit
 
-        check_junit(junit)
+        check_junit(junit, "validate")
     validation = call(plugin or declared[0], surfaces=[*mesh, *split(surfaces)], reporter=SHOWN)
     folder = call.keywords["output"]
     written = {} if folder is None else written_files(folder)
@@ -74,11 +72,13 @@ def validate(
         for path in written.values():
             out.print(path, style="dim", markup=False, soft_wrap=True)
     if markdown or junit:
-        from cembench.validation.summaries import append_markdown, write_junit
+        from cembench.validation.summaries import append_markdown, checks_of
 
         if markdown:
             append_markdown(validation, markdown)
         if junit:
-            write_junit(validation, junit)
+            from cembench.report.junit import write_junit
+
+            write_junit(junit, "validate", checks_of(validation))
     if not validation.passed:
         raise typer.Exit(1)

@@ -15,7 +15,8 @@ from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import DEFAULT_ROUNDS, USUAL_REFERENCES, Cell, Record
-from cembench.results.runs_compared import Change
+from cembench.results.regressions import figures_of
+from cembench.results.runs_compared import Change, Row
 from cembench.running.estimate import Estimate
 
 #: Maximum number of causes listed.
@@ -123,11 +124,13 @@ def _corrected_words(comparisons: Sequence[Comparison]) -> Iterator[str]:
     )
 
 
-def changes_table(changes: Sequence[Change]) -> Table:
+def changes_table(changes: Sequence[Change], *, paired: bool = False) -> Table:
     """Return the changes from one run to another, as ratios of seconds.
 
-    The ratio is corrected for the drift of the reference kernel, if both runs timed it.
+    The ratio is corrected for the drift of the reference kernel, if both runs timed it. With
+    `paired`, both were measured in the same rounds.
     """
+    drift = () if paired else (_drift_words(changes),)
     comparisons = [change.comparison for change in changes]
     policies = len({change.after["solves"] for change in changes}) > 1
     return Table.of(
@@ -147,8 +150,26 @@ def changes_table(changes: Sequence[Change]) -> Table:
             ]
             for change, together in zip(changes, corrected(comparisons), strict=True)
         ],
-        notes=(_drift_words(changes), *_corrected_words(comparisons), *_verdict_words(changes)),
+        notes=(*drift, *_corrected_words(comparisons), *_verdict_words(changes)),
     )
+
+
+def maps_table(cells: Sequence[tuple[Row, Row]]) -> Table:
+    """Return the maps of both versions: their energies, angle errors, folds and statuses."""
+    names = {"E_C": ".6f", "mean angle error": ".3f", "folds": ".0f"}
+    columns = [
+        Column(when, name, form=form, lacking="no valid map")
+        for name, form in names.items()
+        for when in ("before", "after")
+    ]
+    rows: list[list[Plain]] = []
+    for before, after in cells:
+        old, new = figures_of(before, after), figures_of(after, before)
+        figures = [one.get(name) for name in names for one in (old, new)]
+        ended = [words(one["status"]) for one in (before, after)]
+        rows.append([after["mesh"], after["algorithm"], *figures, *ended])
+    states = [Column(when, "status", numeric=False) for when in ("before", "after")]
+    return Table.of("maps", "", ["surface", "algorithm", *columns, *states], rows)
 
 
 def _verdict_words(changes: Sequence[Change]) -> list[str]:

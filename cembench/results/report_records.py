@@ -49,7 +49,7 @@ def text_rows(folder: Path) -> list[dict[str, str]]:
 
 
 class _Cell(BaseModel):
-    """What a row says of a cell and its times."""
+    """What a row says of a cell, its times and its map."""
 
     mesh: str
     algorithm: str
@@ -65,6 +65,14 @@ class _Cell(BaseModel):
     seconds_kernel: Json[list[PositiveFloat | None]] = []
     reference: str | None = None
     verdict: str | None = None
+    status: str = "ok"
+    cause: str | None = None
+    target: str = "disk"
+    conformal_energy: float | None = None
+    common_gauge_energy: float | None = None
+    image_area: float | None = None
+    angle_error_mean_deg: float | None = None
+    flipped_triangles: int | None = None
 
 
 def read_rows(folder: Path) -> list[dict[str, Any]]:

@@ -58,13 +58,17 @@ def compare_runs(before: Sequence[Row], after: Sequence[Row]) -> list[Change]:
 
     The code may differ; that is the purpose of the comparison.
     """
-    earlier = {_same(row): row for row in before}
-    pairs = [(earlier.get(_same(row)), row) for row in after]
     return [
         _change(old, row)
-        for old, row in pairs
-        if old is not None and old["seconds_raw"] and row["seconds_raw"]
+        for old, row in common_cells(before, after)
+        if old["seconds_raw"] and row["seconds_raw"]
     ]
+
+
+def common_cells(before: Sequence[Row], after: Sequence[Row]) -> list[tuple[Row, Row]]:
+    """Return the cells of both runs, timed or not."""
+    earlier = {_same(row): row for row in before}
+    return [(earlier[_same(row)], row) for row in after if _same(row) in earlier]
 
 
 def _change(before: Row, after: Row) -> Change:

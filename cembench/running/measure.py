@@ -47,6 +47,7 @@ from cembench.running.map_promises import Promise
 from cembench.running.memory import Memory, memory_of_call
 from cembench.running.processor import Processor, after_call, before_call
 from cembench.running.quality import better_parameters
+from cembench.running.relay import RELAYS
 from cembench.running.rigid_motion import UNMOVED, drawn, moved
 from cembench.running.sanitized_result import (
     Returned,
@@ -288,7 +289,8 @@ def _called(
             program = _about_program(call)
         else:
             with linear_algebra(cell.solves, cell.backend), counting() as work:
-                measured = memory_of_call if memory else _without_memory
+                ours = cell.algorithm not in RELAYS  # else the memory is of another process
+                measured = memory_of_call if memory and ours else _without_memory
                 (returned, timing), used = measured(
                     lambda: _without_collector(lambda: call(mesh.fresh()))
                 )

@@ -22,7 +22,7 @@ from pydantic import BaseModel
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
-from cembench.registry import load_algorithm
+from cembench.registry import Algorithm, load_algorithm
 from cembench.results.records import Cell, Fault, Outcome, Round
 from cembench.running.external.call import use_folder
 from cembench.running.map_checks import Checked, JudgedCalls, judged_calls, judged_check
@@ -30,6 +30,7 @@ from cembench.running.map_promises import Promise
 from cembench.running.measure import Timed, TimedCalls, call_cell, preparing_seconds, timed_together
 from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import after_call, keep_orphans
+from cembench.running.relay import RELAYS, end_solvers, start_solver
 from cembench.running.rigid_motion import moved
 from cembench.running.sanitized_result import outcome_of_error
 from cembench.running.timing_checks import Used
@@ -123,6 +124,7 @@ def main(path: Path) -> None:
         limit_memory(job.memory_bytes)
     use_folder(job.answer_file.with_name(PROGRAMS))
     answer = _TASKS[job.task](job)
+    end_solvers()
     job.answer_file.write_text(answer.model_dump_json(), encoding="utf-8")
 
 
@@ -140,8 +142,14 @@ def load_libraries() -> None:
         importlib.import_module(name)
 
 
+def _loaded(cell: Cell, plugins: tuple[str, ...]) -> Algorithm:
+    algorithm = load_algorithm(cell.algorithm, plugins)
+    start_solver(cell.algorithm)
+    return algorithm
+
+
 def _check(job: Job) -> Answer:
-    algorithm = load_algorithm(job.cell.algorithm, job.plugins)
+    algorithm = _loaded(job.cell, job.plugins)
     surface = moved(_mesh(job), *job.motions) if job.motions else _mesh(job)
     cell = job.cell.model_copy(update={"mesh_hash": surface.hash})
     outcome, uv = call_cell(algorithm, surface, cell)
@@ -154,7 +162,7 @@ def _time(job: Job) -> Answer:
     began, preparing = monotonic(), preparing_seconds(_as_large(job))
     cells = [
         Timed(
-            load_algorithm(part.cell.algorithm, part.plugins),
+            _loaded(part.cell, part.plugins),
             part.cell,
             part.motions,
             part.first_counts,
@@ -171,11 +179,14 @@ def _time(job: Job) -> Answer:
     used.began = began
     if any(one.algorithm.program is not None for one in cells):
         used.own = 0.0  # writing and reading the files is not part of the program's wall-clock time
+    if any(part.cell.algorithm in RELAYS for part in job.parts):
+        used.disturbed = 0  # a process that has answered may still be about to sleep
     parts = []
     for part, (measured, timed) in zip(job.parts, each, strict=True):
         np.save(part.uv_file, _maps(timed))
         motions = tuple(call.motion for call in timed.calls)
         parts.append(TimedPart(round=measured, names=tuple(timed.names()), motions=motions))
+    end_solvers()
     used.everything = after_call().total
     return Answer(parts=tuple(parts), used=used)
 

@@ -32,14 +32,9 @@ from cembench.results.comparison import (
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
 from cembench.results.records import FaultKind, Record
+from cembench.results.regressions import NO_ANGLE, NO_ENERGY, TIE
 from cembench.validation.finding import Stage, ValidationFinding, finding
 
-#: Ratios this close to 1 are ties.
-TIE = 0.01
-#: Energies below this share of the image's area are rounding, and count as equal.
-NO_ENERGY = 1e-9
-#: Smaller mean angle errors, in degrees, count as this: their ratios are of rounding.
-_NO_ANGLE = 0.01
 _GAUGE = "common_gauge_energy"
 
 
@@ -72,7 +67,7 @@ class Pair(BaseModel):
         ours, theirs = self.angle, self.baseline_angle
         if ours is None or theirs is None:
             return None
-        return max(ours, _NO_ANGLE) / max(theirs, _NO_ANGLE)
+        return max(ours, NO_ANGLE) / max(theirs, NO_ANGLE)
 
     surface: str
     faces: int

@@ -10,9 +10,10 @@ from collections.abc import Mapping
 from itertools import pairwise
 from math import log
 
+from cembench.results.regressions import NO_ENERGY, TIE
 from cembench.validation.correctness import ENERGY_ORDER
 from cembench.validation.finding import Stage, ValidationFinding, finding
-from cembench.validation.quality import NO_ENERGY, TIE, BaselineComparison, Pair
+from cembench.validation.quality import BaselineComparison, Pair
 
 #: From one size to the next E_C has to fall like that of a conformal map, or by at most this order
 #: less than the reference's, whose own tolerances may end its convergence.

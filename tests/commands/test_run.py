@@ -264,3 +264,35 @@ def test_ctrl_c_in_a_command_that_keeps_nothing_says_only_that_it_stopped(cli, m
     assert code == 130
     assert "Stopped." in err
     assert "resumes" not in err
+
+
+@pytest.mark.parametrize(
+    ("pair", "words", "code"),
+    [
+        (("one", "two"), "slower,worse,invalid", 0),
+        (("two", "one"), "slower", 1),
+        (("two", "one"), "worse", 0),
+        (("one", "one"), "slower", 0),
+    ],
+)
+def test_compare_fails_on_what_it_is_told_to(runs, pair, words, code):
+    assert runs("compare", *pair, "--fail-on", words)[0] == code
+
+
+def test_compare_says_which_words_it_fails_on(runs):
+    code, _, err = runs("compare", "one", "two", "--fail-on", "slow")
+    assert code == 2
+    assert "--fail-on: unknown kind of regression 'slow'. Did you mean slower?" in err
+
+
+def test_compare_writes_no_junit_over_another_file(runs):
+    (runs.folder / "j.xml").write_text("mine")
+    code, _, err = runs("compare", "one", "two", "--junit", "j.xml")
+    assert code == 2
+    assert "was not written by `cembench compare`" in err
+
+
+def test_compare_needs_two_runs_or_solvers(runs):
+    code, _, err = runs("compare", "one")
+    assert code == 2
+    assert "name two folders of runs; or name solvers by -a" in err

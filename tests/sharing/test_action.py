@@ -1,6 +1,7 @@
 """The action for authors of solvers: its steps, run here as a workflow would run them."""
 
 import shutil
+import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -26,18 +27,18 @@ def heights(mesh: DiskMesh) -> Parameterization:
 """
 
 
-def validate(folder, **inputs):
-    """The step Validate with these inputs; the others have their defaults."""
+def acted(folder, name="Validate", junit="junit", **inputs):
+    """A step of the action with these inputs; the others have their defaults."""
     action = yaml.safe_load(ACTION.read_text())
     assert inputs.keys() <= action["inputs"].keys()
     given = {name: one["default"] for name, one in action["inputs"].items()} | inputs
-    step = steps_of(ACTION)["Validate"]
+    step = steps_of(ACTION)[name]
     environment = {
         variable: given[place.removeprefix("${{ inputs.").removesuffix(" }}")]
         for variable, place in step["env"].items()
     }
     code, said, summary = run_step(step, folder, **environment)
-    return code, said, summary, Xml.parse(folder / given["junit"]).getroot()
+    return code, said, summary, Xml.parse(folder / given[junit]).getroot()
 
 
 def rendered(summary):
@@ -47,7 +48,7 @@ def rendered(summary):
 @pytest.mark.slow
 def test_the_example_solver_s_verdict_is_in_the_summary(tmp_path):
     shutil.copy(EXAMPLE / "solver.py", tmp_path)
-    code, said, summary, checks = validate(tmp_path, plugin="solver.py", arguments="--checks-only")
+    code, said, summary, checks = acted(tmp_path, plugin="solver.py", arguments="--checks-only")
     assert code == 0, said
     page = rendered(summary)
     assert "<h2>✅ Ours: passed</h2>" in page
@@ -58,7 +59,7 @@ def test_the_example_solver_s_verdict_is_in_the_summary(tmp_path):
 
 def test_a_wrong_solver_fails_and_the_summary_says_why(tmp_path):
     (tmp_path / "heights.py").write_text(WRONG)
-    code, said, summary, checks = validate(tmp_path, plugin="heights.py", arguments="--checks-only")
+    code, said, summary, checks = acted(tmp_path, plugin="heights.py", arguments="--checks-only")
     assert code == 1, said
     page = rendered(summary)
     assert "<h2>❌ Heights: did not pass</h2>" in page
@@ -72,7 +73,7 @@ def test_a_wrong_solver_fails_and_the_summary_says_why(tmp_path):
 @pytest.mark.slow
 def test_a_program_is_judged_by_its_command(tmp_path):
     shutil.copy(ROOT / "examples/external/tutte.py", tmp_path)
-    code, said, summary, _ = validate(
+    code, said, summary, _ = acted(
         tmp_path,
         command=f"{sys.executable} tutte.py {{input}} {{output}}",
         arguments="--checks-only --program output=.txt --program target=disk",
@@ -80,6 +81,28 @@ def test_a_program_is_judged_by_its_command(tmp_path):
     assert code == 1, said
     assert "did not pass" in summary
     assert "refinement" in summary, "Tutte's map is not conformal, and nobody said so"
+
+
+@pytest.mark.slow
+def test_a_solver_is_compared_with_its_version_at_a_base(tmp_path):
+    def git(*words):
+        me = ["-c", "user.name=a", "-c", "user.email=a@b"]
+        subprocess.run(["git", *me, *words], cwd=tmp_path, check=True, capture_output=True)
+
+    git("init", "-q")
+    text = (EXAMPLE / "solver.py").read_text()
+    wrong = text.replace("arc_length_circle(mesh))", "arc_length_circle(mesh) ** 2)")
+    for version in (text, wrong):
+        (tmp_path / "solver.py").write_text(version)
+        git("add", "solver.py")
+        git("commit", "-qm", "a version")
+    given = {"plugin": "solver.py", "solver": "ours", "base": "HEAD~1"}
+    given["compare-arguments"] = "--surfaces cone --faces 120 --rounds 1"
+    code, said, summary, checks = acted(tmp_path, "Compare", "compare-junit", **given)
+    assert code == 1, said
+    assert "error: invalid: ours on cone" in said
+    assert "invalid" in rendered(summary)
+    assert len(checks.findall(".//failure")) == 1
 
 
 @pytest.mark.parametrize("file", [ACTION, WORKFLOW, ROOT / "examples/results_repository"])

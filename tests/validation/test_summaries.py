@@ -5,8 +5,9 @@ from xml.etree import ElementTree as Xml
 import pytest
 
 from cembench.core.errors import ParameterError
+from cembench.report.junit import write_junit
 from cembench.validation.finding import ValidationFinding
-from cembench.validation.summaries import append_markdown, write_junit
+from cembench.validation.summaries import append_markdown, checks_of
 from cembench.validation.verdict import Requirement, Validation
 
 FAULT = ValidationFinding(
@@ -28,7 +29,7 @@ def test_junit_has_checks_skipped_stages_and_requirements(tmp_path):
     path = tmp_path / "j.xml"
     good = FAULT.model_copy(update={"ok": True, "name": "mesh untouched"})
     skipped = {"quality": "not examined, because of a fault in contract"}
-    write_junit(validation(FAULT, good, skipped=skipped), path)
+    write_junit(path, "validate", checks_of(validation(FAULT, good, skipped=skipped)))
     root = Xml.parse(path).getroot()
     contract = root.find("testsuite[@name='a: contract']")
     assert [contract.get(name) for name in ("tests", "failures", "skipped")] == ["2", "1", "0"]
@@ -36,7 +37,7 @@ def test_junit_has_checks_skipped_stages_and_requirements(tmp_path):
     assert failure.get("message") == "uv is <complex64> & \ufffd[31m"
     assert failure.text == "allowed: complex128\nto do: convert it"
     assert root.find("testsuite[@name='a: quality']").get("skipped") == "1"
-    write_junit(validation(good, unmet=(Requirement.faster,)), path)
+    write_junit(path, "validate", checks_of(validation(good, unmet=(Requirement.faster,))))
     assert [case.get("name") for case in Xml.parse(path).getroot().findall(".//testcase")] == [
         "mesh untouched",
         "faster",
@@ -45,7 +46,7 @@ def test_junit_has_checks_skipped_stages_and_requirements(tmp_path):
 
 def test_checks_of_one_name_on_two_surfaces_are_two_cases(tmp_path):
     both = [FAULT.model_copy(update={"surface": name}) for name in ("cap", "cone")]
-    write_junit(validation(*both), tmp_path / "j.xml")
+    write_junit(tmp_path / "j.xml", "validate", checks_of(validation(*both)))
     cases = Xml.parse(tmp_path / "j.xml").getroot().findall(".//testcase")
     assert [case.get("name") for case in cases] == [
         "returns a map on cap",
@@ -57,7 +58,7 @@ def test_another_s_file_is_not_replaced(tmp_path):
     path = tmp_path / "j.xml"
     path.write_text("<testsuites name='mine'/>")
     with pytest.raises(ParameterError, match="was not written by `cembench validate`"):
-        write_junit(validation(), path)
+        write_junit(path, "validate", [])
     assert path.read_text() == "<testsuites name='mine'/>"
 
 

@@ -155,7 +155,7 @@ class ProgramCalls:
         lacking = missing(self.algorithm)
         if lacking:
             raise NotThere(lacking)
-        with _own_folder() as folder:
+        with own_folder() as folder:
             input_file = folder / f"mesh{program.input}"
             output_file = folder / program.output_name
             write_input(input_file, mesh)
@@ -225,8 +225,8 @@ def small_mesh(like: TriangleMesh) -> TriangleMesh:
 
 
 @contextmanager
-def _own_folder() -> Iterator[Path]:
-    """Yield a temporary folder for one call."""
+def own_folder() -> Iterator[Path]:
+    """Yield a temporary folder for a program."""
     above = _folder_of_process[0] if _folder_of_process else None
     if above is not None:
         above.mkdir(parents=True, exist_ok=True)

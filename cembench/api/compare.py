@@ -1,0 +1,333 @@
+"""Compare two versions of solvers: commits, installed environments, or plug-in files."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from cembench.api.settings import AnyPath, Faces, Rounds, Seed, Threads, Timeout
+from cembench.core.arguments import checked
+from cembench.core.errors import ParameterError
+from cembench.core.reporter import SILENT, Reporter
+
+if TYPE_CHECKING:
+    from cembench.api.benchmark import Run
+    from cembench.results.regressions import Regression
+    from cembench.results.runs_compared import Change, Row
+    from cembench.running.surfaces import SurfaceInput
+
+#: Rounds of a comparison: enough for a verdict on one of many surfaces.
+USUAL_ROUNDS = 12
+
+
+@dataclass(frozen=True)
+class Version:
+    """A version of solvers.
+
+    `about` says which one it is, and `python` is its interpreter. Its code is in `folder`, unless
+    it is installed.
+    """
+
+    name: str
+    about: str
+    python: str
+    folder: str = ""
+    plugins: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class VersionsCompared:
+    """Two versions of solvers, compared.
+
+    Parameters
+    ----------
+    run : Run
+        The run that measured both: the algorithms are called ``NAME@VERSION``.
+    versions : tuple of str
+        What the versions are, the earlier one first.
+    cells : tuple of pairs of mappings
+        The rows of both versions for each algorithm on each surface.
+    changes : tuple of Change
+        The seconds compared, those of paired rounds: of each timed cell, and then of each
+        algorithm over all surfaces.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> run = cembench.Run("results/run")
+    >>> cembench.VersionsCompared(run, ("old", "new"), (), ()).versions
+    ('old', 'new')
+
+    """
+
+    run: Run
+    versions: tuple[str, str]
+    cells: tuple[tuple[Row, Row], ...]
+    changes: tuple[Change, ...]
+
+    def regressions(
+        self, fail_on: Iterable[str] = ("slower", "worse", "invalid")
+    ) -> list[Regression]:
+        """Return what became worse.
+
+        Parameters
+        ----------
+        fail_on : iterable of "slower", "worse" and "invalid"
+            What to look for. The verdicts "slower" hold together with 95 %.
+
+        Returns
+        -------
+        list of Regression
+            What became worse: each has a `kind`, an `algorithm`, a `surface` and a `detail`.
+
+        Raises
+        ------
+        ParameterError
+            One of them is unknown.
+        RecordError
+            There was no valid map before.
+
+        """
+        from cembench.results.regressions import regressions
+
+        return regressions(self.cells, self.changes, fail_on)
+
+
+@checked
+def compare_versions(
+    before: str | None = None,
+    after: str | None = None,
+    *,
+    algorithms: Sequence[str] = (),
+    env: Mapping[str, AnyPath] | None = None,
+    plugins: Sequence[str] = (),
+    surfaces: Iterable[SurfaceInput] = (),
+    sets: Sequence[str] = (),
+    limit: int | None = None,
+    faces: Faces | None = None,
+    rounds: Rounds = USUAL_ROUNDS,
+    seed: Seed = 0,
+    timeout: Timeout = 600.0,
+    threads: Threads = 1,
+    output: AnyPath | None = None,
+    reporter: Reporter = SILENT,
+) -> VersionsCompared:
+    """Compare two versions of solvers: whether maps became worse, and which one is faster.
+
+    Each round measures both on the same surfaces, in random order and in fresh processes, each
+    version in its environment. The harness is that of this installation for both.
+
+    Parameters
+    ----------
+    before, after : str, optional
+        Two commits of the repository in the current folder, such as HEAD~1 and HEAD, or two
+        plug-in files (FILE.py) that declare the same solvers.
+    algorithms : sequence of str
+        Names of the solvers to compare.
+    env : mapping, optional
+        Instead of `before` and `after`, two installed environments: NAME=PYTHON, the path of the
+        interpreter.
+    plugins : sequence of str
+        Python files or ``module:name`` that declare the solvers; for commits, files of the
+        repository.
+    surfaces : iterable of meshes, paths, names or pairs of arrays
+        The surfaces (default: the set quick).
+    sets : sequence of str
+        Many surfaces: quick, standard, paper (the profiles), real-disks, corpus, a folder, ...
+    limit : int, optional
+        Maximum number of surfaces per set of `sets`.
+    faces : int, optional
+        Number of triangles of generated surfaces.
+    rounds : int
+        Number of rounds. Fewer than 12 may not decide between many surfaces.
+    seed : int
+        Seed of the random order within a round.
+    timeout : float
+        Time limit of a call, in seconds.
+    threads : int
+        Threads of the numerical libraries.
+    output : path, optional
+        The run's folder. Default in Python: a new temporary folder.
+    reporter : Reporter
+        Receives what is being done.
+
+    Returns
+    -------
+    VersionsCompared
+        The comparison; ``.regressions()`` is what became worse.
+
+    Raises
+    ------
+    ParameterError
+        There are not two versions, a commit is unknown, or the current folder is in no repository.
+    RegistryError
+        An environment does not start, or a version has no such solver.
+    MeshError
+        A surface is unknown or damaged, or no solver takes it.
+
+    Examples
+    --------
+    >>> import sys
+    >>> import cembench
+    >>> same = {"old": sys.executable, "new": sys.executable}
+    >>> found = cembench.compare_versions(
+    ...     algorithms=["harmonic-circle"], env=same, surfaces=["flat-disk"], faces=120, rounds=1
+    ... )
+    >>> found.regressions(["worse", "invalid"])
+    []
+
+    """
+    from cembench.api.benchmark import benchmark
+    from cembench.results.profiles import Profile
+    from cembench.running.relay import Relay, declared
+
+    if not algorithms:
+        raise ParameterError("name the solvers to compare: algorithms='cem'.")
+    sets = sets or (() if surfaces else ("quick",))
+    profile: Any = next((one for one in sets if one in list(Profile)), None)
+    with tempfile.TemporaryDirectory(prefix="cembench-") as place, ExitStack() as stack:
+        with reporter.busy("preparing both versions"):
+            versions = _versions(before, after, env, plugins, Path(place), stack)
+            wanted = [(name, version) for name in algorithms for version in versions]
+            relays = [
+                Relay(f"{name}@{one.name}", one.python, name, one.about, one.folder, one.plugins)
+                for name, one in wanted
+            ]
+            source = "\n".join(declared(number, one) for number, one in enumerate(relays))
+        plugin = Path(place) / "solvers_of_versions.py"
+        plugin.write_text(source, encoding="utf-8")
+        run = benchmark(
+            surfaces,
+            [relay.name for relay in relays],
+            profile=profile,
+            sets=[one for one in sets if one != profile],
+            limit=limit,
+            faces=faces,
+            plugins=[str(plugin)],
+            rounds=rounds,
+            pairing="separate",
+            seed=seed,
+            timeout=timeout,
+            threads=threads,
+            reference=relays[0].name,
+            output=output,
+            reporter=reporter,
+        )
+    return _compared(run, algorithms, versions)
+
+
+def _compared(run: Run, algorithms: Sequence[str], versions: Sequence[Version]) -> VersionsCompared:
+    """Return what the records of a run say of two versions."""
+    from cembench.results.columns import row
+    from cembench.results.comparison import compare
+    from cembench.results.runs_compared import Change
+    from cembench.validation.quality import compare_speed
+
+    old, new = versions
+    cells, changes, whole = [], [], []
+    for name in algorithms:
+        earlier, later = (
+            {r.cell.mesh_hash: r for r in run.asked if r.cell.algorithm == f"{name}@{one.name}"}
+            for one in (old, new)
+        )
+        pairs = [(later[key], earlier[key]) for key in earlier]
+        for records in pairs:
+            after, before = (row(record) | {"algorithm": name} for record in records)
+            cells.append((before, after))
+            if (found := compare(*records)) is not None:
+                changes.append(Change(before, after, found))
+        if len(pairs) > 1 and (over_all := compare_speed(pairs)) is not None:
+            about = {"mesh": "all surfaces", "algorithm": name, "solves": "", "seconds": None}
+            whole.append(Change(about, about, over_all))
+    return VersionsCompared(run, (old.about, new.about), tuple(cells), (*changes, *whole))
+
+
+def _versions(
+    before: str | None,
+    after: str | None,
+    env: Mapping[str, AnyPath] | None,
+    plugins: Sequence[str],
+    place: Path,
+    stack: ExitStack,
+) -> list[Version]:
+    """Return the two versions that a user names; what they need is removed with the stack."""
+    named = [one for one in (before, after) if one is not None]
+    if len(env or named) != 2 or (env and named):
+        raise ParameterError(
+            "name two versions: two commits (HEAD~1 HEAD), two plug-in files, or two environments "
+            "by `env`."
+        )
+    if env:
+        files = tuple(_absolute(one) for one in plugins)
+        return [
+            Version(name, f"{name} ({path})", str(path), plugins=files)
+            for name, path in env.items()
+        ]
+    labels = ("before", "after")
+    if all(one.endswith(".py") for one in named):
+        return [
+            Version(label, one, sys.executable, plugins=tuple(map(_absolute, (*plugins, one))))
+            for label, one in zip(labels, named, strict=True)
+        ]
+    commits = [_commit(one) for one in named]
+    inside = _git("rev-parse", "--show-prefix")
+    return [
+        Version(
+            label,
+            f"{ref} ({commit[:12]})",
+            sys.executable,
+            str(stack.enter_context(_worktree(commit, place / label)) / inside),
+            tuple(plugins),
+        )
+        for label, ref, commit in zip(labels, named, commits, strict=True)
+    ]
+
+
+def _absolute(plugin: str) -> str:
+    return str(Path(plugin).absolute()) if plugin.endswith(".py") else plugin
+
+
+def _commit(ref: str) -> str:
+    """Return the hash of a commit.
+
+    Raises
+    ------
+    ParameterError
+        There is no repository, or no such commit.
+
+    """
+    try:
+        _git("rev-parse", "--git-dir")
+    except (OSError, subprocess.CalledProcessError):
+        raise ParameterError(
+            f"{ref!r} would be a commit, but the current folder is in no repository of git. Change "
+            "to it, or name two plug-in files (FILE.py) or two environments."
+        ) from None
+    try:
+        return _git("rev-parse", "--verify", "--quiet", "--end-of-options", f"{ref}^{{commit}}")
+    except subprocess.CalledProcessError:
+        raise ParameterError(
+            f"the repository in the current folder has no commit {ref!r}; `git log --oneline` "
+            "lists them. In a shallow clone, fetch it first."
+        ) from None
+
+
+@contextmanager
+def _worktree(commit: str, folder: Path) -> Iterator[Path]:
+    """Check a commit out into a folder, for the time of the block."""
+    _git("worktree", "add", "--detach", str(folder), commit)
+    try:
+        yield folder
+    finally:
+        _git("worktree", "remove", "--force", str(folder))
+
+
+def _git(*words: str) -> str:
+    ended = subprocess.run(["git", *words], capture_output=True, encoding="utf-8", check=True)
+    return ended.stdout.strip()
