@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks.holed_surfaces import holed_below
 from benchmarks.measuring import progress
-from benchmarks.pages import Section, Table
+from benchmarks.pages import Section
 from cembench.conformal.metrics import angle_errors
 from cembench.core.errors import AlgorithmFailed, NotPositiveDefinite
 from cembench.mesh.triangle_mesh import HoledMesh
@@ -25,12 +25,10 @@ READINGS: dict[str, dict[str, Any]] = {
     "usual": {},
 }
 OFF_CIRCLE = find_paper("cem").numbers["off_circle"]
-LAYOUT = """
-| surface | triangles | holes | as printed: off a circle, % | mean angle error \
-| the usual reading: off a circle, % | mean angle error |
-|---|---:|---:|---:|---:|---:|---:|
-| {surface} | {faces:,} | {holes} | {printed[off]:.2g} | {printed[angle]:.2f} | {usual[off]:.2g} \
-| {usual[angle]:.2f} |"""
+#: What is told of a map: how far its holes are from circles, and its angle error.
+NAMES = ("off", "angle")
+FILE = "docs/printed_koebe.csv"
+HEADER = "surface,triangles,holes,printed_off_percent,printed_angle,usual_off_percent,usual_angle"
 
 
 def printed_koebe(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
@@ -49,10 +47,20 @@ def printed_koebe(folders: Sequence[Path], *, faces: int = 150_000) -> Section:
         about = {"surface": name, "faces": mesh.m, "holes": len(mesh.loops) - 1}
         if any(found.values()):
             rows.append(about | {what: one or dict.fromkeys(NAMES) for what, one in found.items()})
-    return Section([in_words(rows), Table(rows, LAYOUT)], "docs/holes.md")
+    link = "[printed_koebe.csv](path:printed_koebe.csv) has each surface."
+    return Section([f"{in_words(rows)} {link}"], "docs/holes.md", {FILE: as_csv(rows)})
 
 
-NAMES = ("off", "angle")
+def as_csv(rows: Sequence[dict[str, Any]]) -> str:
+    """Return the figures of each surface as CSV; empty where a reading has no map."""
+    lines = [HEADER]
+    for row in rows:
+        cells = [row["surface"], row["faces"], row["holes"]]
+        for reading in READINGS:
+            off, angle = (row[reading][name] for name in NAMES)
+            cells += ["", ""] if off is None else [f"{off:.2g}", f"{angle:.2f}"]
+        lines.append(",".join(map(str, cells)))
+    return "\n".join([*lines, ""])
 
 
 def mapped(mesh: HoledMesh, reading: dict[str, Any]) -> dict[str, float]:
