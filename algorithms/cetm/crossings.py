@@ -14,9 +14,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cembench.core.arrays import Indices
+from cembench.core.errors import AlgorithmFailed
 
 #: No crossing: a path begins or ends at a vertex.
 END = -1
+#: Crossings that flips may make, so many and so many for each edge: some seconds' worth.
+MOST, MOST_OF_AN_EDGE = 2_000_000, 20
 
 
 @dataclass
@@ -80,10 +83,23 @@ class Crossings:
         return first
 
     def flip_all(self, rounds: Iterable[Indices]) -> None:
-        """Flip edges that are given by half-edges, in rounds that share no triangle."""
+        """Flip edges that are given by half-edges, in rounds that share no triangle.
+
+        Raises
+        ------
+        AlgorithmFailed
+            The paths cross the edges too often.
+
+        """
+        most = MOST + MOST_OF_AN_EDGE * len(self.on_edge)
         for some in rounds:
             for h in some.tolist():
                 self.flip(h)
+                if len(self.before) > most:
+                    raise AlgorithmFailed(
+                        f"the given edges cross the flipped ones more than {most:,} times on the "
+                        "way, so the common refinement is not made"
+                    )
 
     def path(self, given: int) -> list[int]:
         """Return the crossings of a given edge, along it."""

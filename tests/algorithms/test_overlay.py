@@ -7,7 +7,7 @@ from cembench.algorithms.cetm.flips import cetm_flips
 from cembench.algorithms.cetm.overlay import refined_map
 
 import cembench
-from cembench import DiskMesh, ParameterError
+from cembench import AlgorithmFailed, DiskMesh, ParameterError
 from cembench.conformal.doubling import doubled
 from cembench.conformal.metrics import flipped_triangles, is_disk_map
 from cembench.mesh.intrinsic import Triangulation
@@ -89,6 +89,14 @@ def test_parameterize_returns_and_writes_the_refined_surface(tmp_path):
     assert result.metrics["flipped_triangles"] == 0
     again = cembench.read_mesh(result.save(tmp_path / "fine.obj"))
     assert again.m == result.mesh.m
+
+
+def test_edges_that_cross_too_often_end_the_refinement(monkeypatch):
+    """Where a surface winds, the edges of both triangulations cross without a useful limit."""
+    monkeypatch.setattr("cembench.algorithms.cetm.crossings.MOST", 3)
+    monkeypatch.setattr("cembench.algorithms.cetm.crossings.MOST_OF_AN_EDGE", 0)
+    with pytest.raises(AlgorithmFailed, match="cross the flipped ones more than 3 times"):
+        refined_map(bumpy())
 
 
 def test_others_have_no_overlay():
