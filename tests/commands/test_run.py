@@ -282,7 +282,7 @@ def test_compare_fails_on_what_it_is_told_to(runs, pair, words, code):
 def test_compare_says_which_words_it_fails_on(runs):
     code, _, err = runs("compare", "one", "two", "--fail-on", "slow")
     assert code == 2
-    assert "--fail-on: unknown kind of regression 'slow'. Did you mean slower?" in err
+    assert "fail_on: unknown kind of regression 'slow'. Did you mean slower?" in err
 
 
 def test_compare_writes_no_junit_over_another_file(runs):

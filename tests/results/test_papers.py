@@ -59,7 +59,7 @@ def folder(tmp_path):
 
 
 def test_a_paper_is_read_from_its_folder_with_its_checks(folder):
-    with pytest.raises(ParameterError, match=r"checks\.py would run with your rights.*trust=True"):
+    with pytest.raises(ParameterError, match=r"checks\.py would run with your rights.*add `trust`"):
         find_paper(str(folder))
     paper = find_paper(str(folder), trust=True)
     assert (paper.models, paper.faces("Hand"), paper.compared) == (("Foot", "Hand"), 200, ("lscm",))
