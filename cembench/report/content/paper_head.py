@@ -94,10 +94,10 @@ def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
     if not rows:
         return None
     note = (
-        f"Average speedup: {evidence.paper.rate}, averaged over the models. Printed: over these "
-        "models, and over all of the paper where those are more. In brackets is the 95 % interval "
-        "over models, or of the share of families of surfaces; 'as printed': it contains the "
-        "printed figure."
+        f"Average speedup: {evidence.paper.rate}, averaged over the models; printed: over all of "
+        "the paper, and in other columns over their models. In brackets is the 95 % interval over "
+        "models, or of the share of families of surfaces; 'as printed': it contains the figure "
+        "printed for these models."
     )
     notes = (note,) if rated else ()
     return Table.of("head", "The main claims", titles, rows, origin="", notes=notes)
@@ -107,13 +107,9 @@ def _rate_rows(evidence: Evidence, origins: Sequence[MeshOrigin]) -> Iterator[li
     paper = evidence.paper
     for policy in evidence.policies:
         for name in paper.compared:
-            these = [s.paper_row for s in evidence.one_per_model]
-            own = MEAN_RATE.of(printed) if (printed := printed_rates(paper, name, these)) else None
-            stated = f"{paper.stated['rate'][name]:.1f}"
-            part = len(these) < len(paper.models) and own is not None
             row: list[Plain] = [
                 f"average speedup over {name.upper()}{under(policy, evidence)}",
-                f"{own:.1f} (all: {stated})" if part else stated,
+                f"{paper.stated['rate'][name]:.1f}",
             ]
             for origin in origins:
                 rate = _rate(evidence, name, policy, origin)
@@ -134,12 +130,12 @@ def _rate(
     interval = enough_rounds(rows["paired"].tolist()) and rate_interval(
         [1 + rate for rate in rates], rows["family"], log=False
     )
-    text = f"{MEAN_RATE.of(rates):.1f}"
-    if not interval or not printed:
-        return Rate(text, _NO_INTERVAL)
-    wanted = MEAN_RATE.of(printed)
+    text, wanted = f"{MEAN_RATE.of(rates):.1f}", MEAN_RATE.of(printed) if printed else None
+    of_these = "" if wanted is None else f", printed {wanted:.1f}"
+    if not interval or wanted is None:
+        return Rate(text + of_these, _NO_INTERVAL)
     side = "more than" if interval.low > wanted else "less than" if interval.high < wanted else "as"
-    return Rate(f"{text} ({interval.low:.1f} to {interval.high:.1f})", f"{side} printed")
+    return Rate(f"{text} ({interval.low:.1f} to {interval.high:.1f}){of_these}", f"{side} printed")
 
 
 def _claim_rows(
