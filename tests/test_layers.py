@@ -80,7 +80,7 @@ BUDGETS = {
     "results": 5_000,
     "running": 7_910,
     "drawing": 1_420,
-    "report": 7_780,
+    "report": 7_770,
     "validation": 2_320,
     "api": 4_530,
     "commands": 2_840,
