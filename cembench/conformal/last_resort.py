@@ -178,6 +178,21 @@ class _Choice:
             self.most_energy = MOST_COST["conformal_energy"] * max(energy, 0)
             self.offer(own)
 
+    @functools.cached_property
+    def graph(self) -> scipy.sparse.csr_array:
+        """Which vertices share an edge."""
+        return vertex_graph(self.mesh.F, self.mesh.n)
+
+    @functools.cached_property
+    def weights(self) -> scipy.sparse.csr_array:
+        """Mean value weights of the surface."""
+        return mean_value_weights(self.mesh.V, self.mesh.F)
+
+    @functools.cached_property
+    def inside(self) -> Mask:
+        """Which vertices lie inside."""
+        return ~_rings(self.graph, self.mesh.boundary, 0)
+
     def offer(self, z: Complex, by_means: int = 0) -> None:
         """Keep a map if it is better."""
         folds = flipped_triangles(self.mesh, z)
@@ -237,8 +252,7 @@ def _offer_means_in_patches(choice: _Choice) -> None:
     folded = folded_triangles(start, mesh.F)
     if len(folded) > MOST_FOLDED * mesh.m:
         return
-    graph, W = vertex_graph(mesh.F, mesh.n), mean_value_weights(mesh.V, mesh.F)
-    inside = ~_rings(graph, mesh.boundary, 0)
+    graph, W, inside = choice.graph, choice.weights, choice.inside
     for rings in MEANS_RINGS:
         near = _rings(graph, mesh.F[folded], rings)
         z = _widened(mesh, start, np.flatnonzero(near))
@@ -274,9 +288,7 @@ def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
 
 def _offer_convex_maps(choice: _Choice, own: Complex) -> None:
     """Offer maps with the image's mean value weights except near its folds."""
-    mesh = choice.mesh
-    graph = vertex_graph(mesh.F, mesh.n)
-    W = mean_value_weights(mesh.V, mesh.F)
+    mesh, graph, W = choice.mesh, choice.graph, choice.weights
     folded = folded_triangles(own, mesh.F)
     for rings in RINGS:
         near = _rings(graph, mesh.F[folded], rings)
@@ -293,12 +305,10 @@ def _offer_layouts(choice: _Choice) -> None:
     First by steps that may fold on the way, which go farther, and then by steps that may not.
     """
     mesh = choice.mesh
-    inside = ~np.isin(np.arange(mesh.n), mesh.boundary)
+    if choice.cost[0] or mesh.m > MOST_TRIANGLES or not choice.inside.any():
+        return
     for first in (FIRST, 0.0):
-        if choice.cost[0] or mesh.m > MOST_TRIANGLES or not inside.any():
-            return
-        graph = vertex_graph(mesh.F, mesh.n)
-        laid_out, _ = untangled(mesh, choice.z, inside, graph, LAYOUT_STEPS, first)
+        laid_out, _ = untangled(mesh, choice.z, choice.inside, choice.graph, LAYOUT_STEPS, first)
         choice.offer(laid_out, choice.by_means)
 
 
@@ -308,7 +318,7 @@ def _offer_mean_value_maps(choice: _Choice, own: Complex | None) -> None:
     by_length = np.zeros(mesh.n, dtype=np.complex128)
     by_length[mesh.boundary] = arc_length_circle(mesh)
     widened = None if own is None else _widened(mesh, own, mesh.boundary)
-    for W in (mean_value_weights(mesh.V, mesh.F), vertex_graph(mesh.F, mesh.n)):
+    for W in (choice.weights, choice.graph):
         choice.offer_means(by_length, everywhere, W)
         if widened is not None:
             choice.offer_means(widened, everywhere, W)
