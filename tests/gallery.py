@@ -4,6 +4,7 @@ import numpy as np
 from cembench.surfaces.flat_disk import flat_disk
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 from cembench.surfaces.holed_disk import disk_with_holes
+from cembench.surfaces.spherical_cap import spherical_cap
 
 from cembench import DiskMesh, HoledMesh
 
@@ -147,3 +148,12 @@ def eared_hole(rows=8, columns=8):
     tip = (V[a] + V[b]) / 2 + (V[hole].mean(axis=0) - (V[a] + V[b]) / 2) / 2
     eared = HoledMesh.from_arrays(np.vstack([V, tip]), np.vstack([F, [b, a, ear]]))
     return eared, ear
+
+
+def mapped_cap():
+    """A cap and its exact conformal map, the stereographic projection."""
+    mesh = spherical_cap(4000)
+    z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / (1 + mesh.V[:, 2])
+    z /= np.abs(z[mesh.boundary]).max()
+    z[mesh.boundary] /= np.abs(z[mesh.boundary])
+    return mesh, z

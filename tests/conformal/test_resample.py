@@ -1,20 +1,15 @@
 import numpy as np
 import pytest
 from cembench.surfaces.flat_disk import flat_disk
-from cembench.surfaces.spherical_cap import spherical_cap
 from scipy import special
 
 from cembench.conformal.resample import interpolated, locate, square_to_disk
+from tests import gallery
 
 
 @pytest.fixture(scope="module")
 def cap():
-    """A cap and its exact conformal map, the stereographic projection."""
-    mesh = spherical_cap(4000)
-    z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / (1 + mesh.V[:, 2])
-    z /= np.abs(z[mesh.boundary]).max()
-    z[mesh.boundary] /= np.abs(z[mesh.boundary])
-    return mesh, z
+    return gallery.mapped_cap()
 
 
 def test_the_square_goes_to_the_disk_conformally():

@@ -1,7 +1,6 @@
 import numpy as np
 import pytest
 from cembench.surfaces.holed_disk import holed_disk
-from cembench.surfaces.spherical_cap import spherical_cap
 from cembench.textures.resample import geometry_image, regular_remesh
 
 from cembench import DiskMesh, ParameterError
@@ -14,12 +13,7 @@ from tests import gallery
 
 @pytest.fixture(scope="module")
 def cap():
-    """A cap and its exact conformal map, the stereographic projection."""
-    mesh = spherical_cap(4000)
-    z = (mesh.V[:, 0] + 1j * mesh.V[:, 1]) / (1 + mesh.V[:, 2])
-    z /= np.abs(z[mesh.boundary]).max()
-    z[mesh.boundary] /= np.abs(z[mesh.boundary])
-    return mesh, z
+    return gallery.mapped_cap()
 
 
 def test_a_geometry_image_lies_on_the_surface_and_is_full(cap):
