@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from cembench import MeshError, TriangleMesh
 from cembench.mesh.files import read_mesh, write_mesh
@@ -90,6 +91,19 @@ def test_what_nobody_reads_and_any_white_space_is_no_damage(suffix, text, tmp_pa
     path.write_text(text)
     read = judge_file(path, lambda path: read_mesh(path, TriangleMesh), legal=True)
     assert (read.outcome, read.fault) == ("mesh", None)
+
+
+@pytest.mark.parametrize(("name", "outcome"), [("note", "mesh"), ("f", "refused")])
+def test_damage_within_a_variable_of_mat_counts_where_it_is_read(name, outcome, tmp_path):
+    path = tmp_path / "a.mat"
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[1, 2, 3]], np.int32)
+    savemat(path, {"note": np.array([[1.0, 2.0]]), "v": V, "f": F})
+    data = bytearray(path.read_bytes())
+    at = data.index(b"note" if name == "note" else b"f\0\0\0") + 8
+    data[at : at + 4] = b"\xff\xff\xff\xff"  # the length of its numbers
+    path.write_bytes(data)
+    read = judge_file(path, lambda path: read_mesh(path, TriangleMesh), legal=False)
+    assert (read.outcome, read.fault) == (outcome, None)
 
 
 def reading(change=lambda V, F: (V, F)):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import struct
 import zlib
 from collections.abc import Iterator
+from itertools import islice
 
 from tests.campaign.reading.content import Content, Damaged, finite
 
@@ -93,16 +94,17 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 
 def _matrix(data: bytes, order: str) -> tuple[str, Table] | None:
-    parts = list(_elements(data, order))
-    if len(parts) < 4 or len(parts[0][1]) < 8 or len(parts[1][1]) < 8 or parts[1][0] != 5:
+    elements = _elements(data, order)
+    head = list(islice(elements, 3))
+    if len(head) < 3 or len(head[0][1]) < 8 or len(head[1][1]) < 8 or head[1][0] != 5:
         return None
-    (flags,) = struct.unpack_from(order + "I", parts[0][1])
-    name = parts[2][1].decode("latin-1")
-    dimensions = struct.unpack(f"{order}{len(parts[1][1]) // 4}i", parts[1][1])
+    (flags,) = struct.unpack_from(order + "I", head[0][1])
+    name = head[2][1].decode("latin-1")
+    dimensions = struct.unpack(f"{order}{len(head[1][1]) // 4}i", head[1][1])
     try:
         if flags & 0xFF not in _NUMERIC or flags & 0x0800 or len(dimensions) != 2:
             raise Damaged(f"{name} is not a matrix of real numbers")
-        kind, body = parts[3]
+        kind, body = next(elements, (0, b""))
         if kind not in _TYPES:
             raise Damaged(f"{name} is of an unknown type")
         return name, _table(_TYPES[kind], body, order, *dimensions, name=name)
