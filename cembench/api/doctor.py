@@ -52,8 +52,8 @@ class InstallationFinding:
     remedy: str = ""
 
 
-def examine() -> list[InstallationFinding]:
-    """Check the interpreter, the libraries, the back ends, the plug-ins and the machine."""
+def doctor() -> list[InstallationFinding]:
+    """Check the installation, and say how to install what is missing."""
     return [
         _python(),
         *map(_library, _REQUIRED),

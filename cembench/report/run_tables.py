@@ -9,8 +9,8 @@ from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
 from cembench.report.document import Item, Plain, Section, Table, Text, Value, entry, words
 from cembench.report.given_tables import given_table
-from cembench.results.columns import marks_explained
-from cembench.results.comparison import Comparison, compare, reference_of, references
+from cembench.results.columns import against_reference, marks_explained
+from cembench.results.comparison import Comparison
 from cembench.results.frame import listed
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
@@ -53,14 +53,8 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
     Without enough rounds for an interval, each surface has one row. None if there is nothing to
     compare.
     """
-    known = references(records, reference)
-    bases = [(record, reference_of(record, known)) for record in records]
-    compared = [
-        (record, comparison)
-        for record, base in bases
-        if base is not None and base.cell.algorithm != record.cell.algorithm
-        if (comparison := compare(record, base)) is not None
-    ]
+    pairs = zip(records, against_reference(records, reference), strict=True)
+    compared = [(record, one) for record, (_, one) in pairs if one is not None]
     if not compared:
         return None
     several = len({record.cell.solves for record, _ in compared}) > 1

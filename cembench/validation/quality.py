@@ -143,7 +143,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     both = [(mine[name], theirs[name]) for name in names]
     pairs = tuple(
         _pair(*records, speed, relative=relative, gauge=gauge)
-        for records, speed in zip(both, _corrected(list(starmap(compare, both))), strict=True)
+        for records, speed in zip(both, corrected(list(starmap(compare, both))), strict=True)
     )
     return BaselineComparison(
         baseline=baseline,
@@ -160,16 +160,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
 
 def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
     """Return the comparisons with verdicts on speed corrected for their number (Holm)."""
-    speeds = _corrected([a.speed for a in against])
+    speeds = corrected([a.speed for a in against])
     return tuple(
         a.model_copy(update={"speed": one}) for a, one in zip(against, speeds, strict=True)
     )
-
-
-def _corrected(found: Sequence[Comparison | None]) -> list[Comparison | None]:
-    """Return comparisons whose verdicts hold together; None without times."""
-    held = iter(corrected([one for one in found if one is not None]))
-    return [one and next(held) for one in found]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:

@@ -21,7 +21,8 @@ from cembench.results.exhibits import (
     write_exhibit,
 )
 
-from .theory_facts import LOOKS, TheoryFacts
+from .exhibit_tables import exhibit_table
+from .theory_facts import TheoryFacts
 
 #: Below this, the excess of an energy over the lowest is rounding.
 LEAST = 1e-12
@@ -86,38 +87,24 @@ def _summary(facts: dict[str, Any]) -> str:
 
 
 def _tables(facts: dict[str, Any]) -> Iterator[ExhibitTable]:
-    checks = {"name": ("what", ""), "source": ("where", ""), "holds": ("holds", "")}
-    checks |= {"figure": ("figure", ".3g"), "meaning": ("meaning", "")}
     for part in ("premises", "statements"):
         rows = [{**check, "holds": "yes" if check["holds"] else "NO"} for check in facts[part]]
-        yield ExhibitTable.of(part.capitalize(), checks, rows, details=("meaning",))
-    looks = {f"after_{k}": (f"after {k}", ".6f") for k in LOOKS} | {"last": ("last", ".6f")}
-    columns = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
-    title = "Conformal energy E_C"
-    yield ExhibitTable.of(title, columns, facts["energies"], details=("iterations",))
-    yield _certificate_table(facts["certificate"])
-
-
-def _certificate_table(of_disk: dict[str, Any]) -> ExhibitTable:
-    title = "Modulus of the surface with four boundary points"
-    columns = ("four boundary points", "modulus", "off by")
-    if "missing" in of_disk:
-        return ExhibitTable(title=title, columns=columns, rows=(), notes=(of_disk["missing"],))
-    modulus = of_disk["modulus"]
-    return ExhibitTable(
-        title=title,
-        columns=columns,
-        rows=(
-            ("surface, at least", of_disk["lower"], None),
-            ("surface, at most", of_disk["upper"], None),
-            ("middle of both", modulus, of_disk["reciprocal_error"]),
-            *(
-                (name, None if off is None else modulus * (1 + off), off)
-                for name, off in of_disk["off"].items()
-            ),
-        ),
-        forms={"modulus": ".5f", "off by": "+.1e"},
-    )
+        yield exhibit_table("checks", rows, title=part.capitalize())
+    yield exhibit_table("energies", facts["energies"])
+    certificate = facts["certificate"]
+    if "missing" in certificate:
+        yield exhibit_table("certificate", (), notes=(certificate["missing"],), forms={})
+        return
+    modulus, reciprocal = certificate["modulus"], certificate["reciprocal_error"]
+    rows = [
+        {"name": "surface, at least", "modulus": certificate["lower"]},
+        {"name": "surface, at most", "modulus": certificate["upper"]},
+        {"name": "middle of both", "modulus": modulus, "off": reciprocal},
+    ]
+    for name, off in certificate["off"].items():
+        own = None if off is None else modulus * (1 + off)
+        rows.append({"name": name, "modulus": own, "off": off})
+    yield exhibit_table("certificate", rows)
 
 
 def _plot(of_disk: TheoryFacts) -> Plot:
