@@ -31,6 +31,13 @@ class MergedRuns:
     conflicts : tuple of Conflict
         The cells that several machines measured.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> run = cembench.benchmark(["flat-disk"], ["lscm"], faces=200, rounds=1, output="first")
+    >>> cembench.merge(["first"], "all").cells
+    1
+
     """
 
     output: Path
@@ -92,7 +99,7 @@ def merge(
     >>> import cembench
     >>> for seed in (1, 2):
     ...     run = cembench.benchmark(
-    ...         ["spherical-cap"], ["lscm"], faces=100 * seed, rounds=1, output=f"run-{seed}"
+    ...         ["flat-disk"], ["lscm"], faces=200 * seed, rounds=1, output=f"run-{seed}"
     ...     )
     >>> cembench.merge(["run-1", "run-2"], "both").cells
     2

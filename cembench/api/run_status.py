@@ -41,6 +41,13 @@ class RunStatus:
     about : mapping
         Everything as plain data, as ``cembench status --json`` prints it.
 
+    Examples
+    --------
+    >>> import cembench
+    >>> run = cembench.benchmark(["flat-disk"], ["lscm"], faces=200, rounds=1)
+    >>> [str(state) for _, state in run.status().cells]
+    ['ok']
+
     """
 
     cells: tuple[tuple[Cell, CellState], ...]

@@ -78,21 +78,8 @@ def given_table(
 ) -> Table:
     """Return a declared table with these rows, which have an entry for each of its columns.
 
-    Parameters
-    ----------
-    name, package, called : str
-        Name of its declaration in a package, and of the table if that is another.
-    rows : iterable of sequences
-        Texts, numbers, and None for a gap.
-    known : mapping
-        What names in braces stand for.
-    each : mapping
-        The texts that repeated columns are for.
-    notes : iterable of str
-        Notes below those that are declared.
-    origin : str
-        Origin of the numbers.
-
+    Names in braces stand for what is `known`, and `each` has the texts that columns are repeated
+    for. A table that is not `called` otherwise has the name of its declaration.
     """
     spec = _declared(package)[name]
     columns = [
