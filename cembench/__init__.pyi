@@ -10,10 +10,13 @@ from cembench.api.catalogue import surface as surface
 from cembench.api.compare import VersionsCompared as VersionsCompared
 from cembench.api.compare import compare_versions as compare_versions
 from cembench.api.cut import cut as cut
+from cembench.api.doctor import doctor as doctor
 from cembench.api.fetch import PublicSurfaces as PublicSurfaces
 from cembench.api.fetch import fetch as fetch
 from cembench.api.measure import measure as measure
 from cembench.api.measurement import Measurement as Measurement
+from cembench.api.merge import MergedRuns as MergedRuns
+from cembench.api.merge import merge as merge
 from cembench.api.papers import check_paper as check_paper
 from cembench.api.parameterize import Result as Result
 from cembench.api.parameterize import parameterize as parameterize
@@ -22,6 +25,7 @@ from cembench.api.repair import Repair as Repair
 from cembench.api.repair import repair as repair
 from cembench.api.reproduce import Reproduction as Reproduction
 from cembench.api.reproduce import reproduce as reproduce
+from cembench.api.run_status import RunStatus as RunStatus
 from cembench.api.terrain import terrain as terrain
 from cembench.api.validate import validate as validate
 from cembench.core.errors import AlgorithmFailed as AlgorithmFailed

@@ -70,7 +70,8 @@ def submissions(
 
 
 def _table(checked: Sequence[api.Submission]) -> Table:
-    from cembench.report.document import Column, Table, words
+    from cembench.report.document import words
+    from cembench.report.given_tables import given_table
 
     rows: list[list[Plain]] = []
     notes: list[str] = []
@@ -80,10 +81,9 @@ def _table(checked: Sequence[api.Submission]) -> Table:
         rows.append([*about, one.cells, one.maps, one.signer or "-"])
         more = f"; and {len(one.faults) - 5} more" if len(one.faults) > 5 else ""
         notes += [f"{one.name}: {'; '.join(one.faults[:5])}{more}"] * bool(one.faults)
-    counts = (Column("cells", form=",d"), Column("maps", form=",d"))
-    title = f"{sum(one.accepted for one in checked)} of {len(checked)} bundles accepted"
-    columns = ("bundle", "found", "machines", *counts, "signed by")
-    return Table.of("submissions", title, columns, rows, notes=tuple(notes))
+    accepted = sum(one.accepted for one in checked)
+    known = {"accepted": accepted, "number": len(checked)}
+    return given_table("submissions", rows, known, package="cembench.sharing", notes=notes)
 
 
 @app.command(

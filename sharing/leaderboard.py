@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import chain
 from math import inf, isfinite
 from pathlib import Path
@@ -35,6 +36,7 @@ from cembench.report.document import (
     missing,
     words,
 )
+from cembench.report.given_tables import given_table
 from cembench.report.palette import series_styles
 from cembench.report.plot_rows import average, front
 from cembench.report.plots import Axis, Plot, PlotPanel, Point, through, write_plot
@@ -98,6 +100,8 @@ def leaderboard(entrants: Sequence[Entrant], command: str, folder: Path | None =
     head = Findings((_leader_words(ranked),), tables=ranked, plot=next(iter(figures), None))
     return Report("Leaderboard", command, tuple(about), sections, _shown(rows), head)
 
+
+shared_table = partial(given_table, package="cembench.sharing")
 
 #: Within each of these, seconds are comparable.
 _PLACE = ["run", "machine", "mesh_hash", "solves"]
@@ -254,14 +258,7 @@ def _success(frame: pd.DataFrame) -> Table:
         shares = {name: _share(some) for name, some in group.groupby("family")}
         rows.append([str(label), *(shares.get(n, lacking) for n in families), _share(group)])
     rows.sort(key=lambda row: (-(row[-1].number or 0.0), row[0]))  # type: ignore[union-attr]
-    return Table.of(
-        "success-by-family",
-        "Valid maps by family of surfaces",
-        ["algorithm", *map(Column, [*families, "all"])],
-        rows,
-        caption="Shares of the cells that ended with a valid map; each opens the first that did "
-        "not, or else the first.",
-    )
+    return shared_table("success-by-family", rows, each={"families": [*families, "all"]})
 
 
 def _share(cells: pd.DataFrame) -> Value:
@@ -295,18 +292,7 @@ def _machines(entrants: Sequence[Entrant]) -> Table:
             software = [str(about.get("cembench") or ""), commit_of(about), entrant.signer]
             rows.append([entrant.name, *machine, about.get("cores"), timing])
             rows[-1] += [one or "-" for one in software]
-    return Table.of(
-        "machines",
-        "Machines and software",
-        [
-            *("run", "machine", "processor"),
-            Column("cores", form=",d", lacking="not recorded"),
-            Column("kernel", unit="ms"),
-            *("cembench", "commit", "signed by"),
-        ],
-        rows,
-        caption="Kernel: a fixed factorisation that is timed in every round.",
-    )
+    return shared_table("machines", rows)
 
 
 def _cells(frame: pd.DataFrame) -> Table:
@@ -318,10 +304,7 @@ def _cells(frame: pd.DataFrame) -> Table:
         rows.append([row["run"], row["machine"] or "not named", row["surface"], row["label"]])
         rows[-1].append(Value(row["status"], record=row["record"]))
         rows[-1] += [entry(figure, significant, lacking, **how) for figure in figures]
-    columns = [Column("mean angle error", unit="°"), Column("seconds", unit="s")]
-    titles = ("run", "machine", "surface", "algorithm", "how")
-    notes = ("Seconds of different machines do not compare.",)
-    return Table.of("every-cell", "Run by run", [*titles, *columns], rows, notes=notes)
+    return shared_table("every-cell", rows)
 
 
 def _shown(rows: Mapping[str, Mapping[str, Any]]) -> dict[str, dict[str, Any]]:

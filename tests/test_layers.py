@@ -80,10 +80,10 @@ BUDGETS = {
     "results": 5_000,
     "running": 7_910,
     "drawing": 1_420,
-    "report": 7_770,
-    "validation": 2_320,
-    "api": 4_530,
-    "commands": 2_840,
+    "report": 7_780,
+    "validation": 2_270,
+    "api": 4_870,
+    "commands": 2_730,
 }
 
 

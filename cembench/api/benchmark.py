@@ -34,6 +34,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
     from cembench.api.run_plan import Plan
+    from cembench.api.run_status import RunStatus
     from cembench.report.document import Report
     from cembench.results.profiles import Profile
     from cembench.results.records import Record
@@ -244,6 +245,106 @@ class Run:
                 paper=asked,
                 records=records,
             )
+
+    def status(self, *, verify: bool = False) -> RunStatus:
+        """Show a run's progress, the cells that did not end ok, and files that were changed.
+
+        Parameters
+        ----------
+        verify : bool
+            Recompute the figures of all maps, not just of a sample.
+
+        Returns
+        -------
+        RunStatus
+            The state of each cell of the last request, and what is wrong with the files.
+
+        Raises
+        ------
+        RecordError
+            There is no such folder.
+
+        """
+        from cembench.api.run_status import status_of
+
+        return status_of(self.folder, everything=verify)
+
+    def show(self, cell: str) -> list[Record]:
+        """Show everything that is recorded about a cell.
+
+        Parameters
+        ----------
+        cell : str
+            The start of a cell's key, or MESH/ALGORITHM.
+
+        Returns
+        -------
+        list of Record
+            The records of the cell, one for each choice of parameters and policy.
+
+        Raises
+        ------
+        RecordError
+            There is no run, no such cell, or its contents disagree.
+
+        """
+        from cembench.core.errors import RecordError
+        from cembench.results.store import Store
+        from cembench.results.verify import Depth, sound_records
+
+        records = sound_records(Store(self.folder), Depth.records)
+        names = [f"{record.cell.mesh}/{record.cell.algorithm}" for record in records]
+        by_name = [r for r, name in zip(records, names, strict=True) if name == cell]
+        found = by_name or [r for r in records if cell and r.cell.key.startswith(cell)]
+        if not found:
+            known = ", ".join(dict.fromkeys(names)) or "nothing"
+            raise RecordError(f"no cell {cell!r} in this run; it holds: {known}.")
+        return found
+
+    @checked
+    def export(
+        self,
+        output: AnyPath | None = None,
+        *,
+        form: Literal["csv", "parquet", "json"] = "csv",
+        verify: bool = False,
+    ) -> Path:
+        """Write all records of a run as one table, one row per cell.
+
+        Parameters
+        ----------
+        output : path, optional
+            Output file (default: RUN/rows.FORMAT).
+        form : str
+            File format.
+        verify : bool
+            Recompute the figures of all maps, not just of a sample.
+
+        Returns
+        -------
+        Path
+            The file.
+
+        Raises
+        ------
+        ParameterError
+            The file is one of the run's own.
+        RecordError
+            There is no run, or its contents disagree.
+
+        """
+        from cembench.report.export import export_rows
+        from cembench.results.columns import rows
+        from cembench.results.run_folder import is_own
+        from cembench.results.store import Store
+        from cembench.results.verify import Depth, sound_records
+
+        path = Path(output) if output else self.folder / f"rows.{form}"
+        if is_own(self.folder, path):
+            raise ParameterError(f"-o {path} is one of the run's own files; name another file.")
+        depth = Depth.everything if verify else Depth.records
+        export_rows(rows(sound_records(Store(self.folder), depth)), path, form)
+        return path
 
     def _repr_html_(self) -> str:
         return str(self.table().to_html(index=False, border=0, na_rep=""))

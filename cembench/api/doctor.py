@@ -52,8 +52,21 @@ class InstallationFinding:
     remedy: str = ""
 
 
-def examine() -> list[InstallationFinding]:
-    """Check the interpreter, the libraries, the back ends, the plug-ins and the machine."""
+def doctor() -> list[InstallationFinding]:
+    """Check the installation, and say how to install what is missing.
+
+    Returns
+    -------
+    list of InstallationFinding
+        A line for the interpreter, each library, extra and back end, the plug-ins and the machine.
+
+    Examples
+    --------
+    >>> import cembench
+    >>> [one.name for one in cembench.doctor() if one.required and not one.ok]
+    []
+
+    """
     return [
         _python(),
         *map(_library, _REQUIRED),

@@ -20,12 +20,15 @@ from cembench.commands.exit_codes import Verbs, ending
 #: The modules that add commands, these in the order of the help, and the function that describes
 #: each.
 MODULES = {
-    "catalogue": {"list": "api.catalogue:catalogue", "doctor": "commands.catalogue:doctor"},
+    "catalogue": {"list": "api.catalogue:catalogue", "doctor": "api.doctor:doctor"},
     "measure": {"measure": "api.measure:measure"},
     "benchmark": {"run": "api.benchmark:benchmark"},
     "report": {"report": "api.benchmark:report"},
     "reproduce": {"reproduce": "api.reproduce:reproduce"},
-    "run": {verb: f"commands.run:{verb}" for verb in ("status", "show", "merge", "export")},
+    "status": {"status": "api.benchmark:status"},
+    "show": {"show": "api.benchmark:show"},
+    "merge": {"merge": "api.merge:merge"},
+    "export": {"export": "api.benchmark:export"},
     "compare": {"compare": "commands.compare:compare"},
     "paper": {"paper": "commands.paper:paper"},
     "validate": {"validate": "api.validate:validate"},

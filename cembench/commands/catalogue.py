@@ -64,10 +64,10 @@ _MARKS = {True: ("bad", "bold red"), False: ("--", "yellow")}
 @app.command(epilog="Example:  cembench doctor --json")
 def doctor(*, as_json: Json = False) -> None:
     """Check the installation, and say how to install what is missing."""
-    from cembench.api.doctor import examine
+    from cembench.api.doctor import doctor as examined
 
     with err.status("checking", spinner="line"):
-        findings = examine()
+        findings = examined()
     if as_json:
         print_json([asdict(finding) for finding in findings])
     else:

@@ -28,14 +28,6 @@ Force = Annotated[
 Verify = Annotated[
     bool, typer.Option("--verify", help="Recompute the figures of all maps, not just of a sample.")
 ]
-RequireSigned = Annotated[
-    Path | None,
-    typer.Option(
-        "--require-signed",
-        metavar="SIGNERS",
-        help="Refuse runs not signed by somebody in this file (ssh-keygen: ALLOWED SIGNERS).",
-    ),
-]
 Junit = Annotated[
     Path | None,
     typer.Option(

@@ -7,17 +7,16 @@ import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from cembench.core.atomic import write, write_text
 from cembench.core.extras import Extra, require
 from cembench.report.document import Report, Table, csv_of, heading, items_of
-from cembench.report.export_format import Format
 
 Rows = Sequence[dict[str, Any]]
 
 
-def export_rows(rows: Rows, path: Path, form: Format) -> None:
+def export_rows(rows: Rows, path: Path, form: Literal["csv", "parquet", "json"]) -> None:
     """Write the rows of :func:`cembench.results.columns.rows` to a file.
 
     In CSV, lists and dictionaries are written as JSON. In Parquet, lists stay lists; dictionaries,
@@ -31,8 +30,8 @@ def export_rows(rows: Rows, path: Path, form: Format) -> None:
         The file cannot be written.
 
     """
-    exporters = {Format.csv: _csv, Format.parquet: _parquet, Format.json: _json}
-    if form is Format.parquet:
+    exporters = {"csv": _csv, "parquet": _parquet, "json": _json}
+    if form == "parquet":
         require(Extra.PARQUET, "a Parquet file")
     write(path, lambda file: exporters[form](rows, file))
 

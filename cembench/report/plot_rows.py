@@ -16,7 +16,8 @@ import numpy as np
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import BIN, Inspection, angles_of
-from cembench.report.document import Column, Table, Value, entry, missing, words
+from cembench.report.document import Table, Value, entry, missing, words
+from cembench.report.given_tables import given_table
 from cembench.report.palette import PLAIN, SeriesStyle
 from cembench.report.plots import PlotSeries, Point, through
 from cembench.results.expressions import with_words
@@ -232,9 +233,6 @@ def staircase(
 
 def exponents_table(evidence: Evidence) -> Table:
     """Return a table of the fitted exponents, printed and measured, with standard errors and n."""
-    columns = [Column("algorithm", numeric=False)]
-    for group in ("printed", *(f"here, {policy}" for policy in evidence.policies)):
-        columns += [Column("exponent", group), Column("n", group)]
     rows = []
     there, measured = printed(evidence), evidence.frame
     for series in evidence.disk_series:
@@ -244,15 +242,8 @@ def exponents_table(evidence: Evidence) -> Table:
         for policy in evidence.policies:
             cells += _fit_cells(own[own["solves"] == policy])
         rows.append(tuple(cells))
-    return Table(
-        "exponents",
-        "Fitted exponents: seconds grow as the number of triangles to this power",
-        tuple(columns),
-        tuple(rows),
-        "Least squares of logarithms; ± one standard error. Iterations also "
-        "differ between surfaces.",
-        (f"an exponent needs at least {FEWEST} sizes",),
-    )
+    groups = ["printed", *(f"here, {policy}" for policy in evidence.policies)]
+    return given_table("exponents", rows, {"fewest": FEWEST}, each={"measured": groups})
 
 
 def _fit_cells(timed: pd.DataFrame) -> list[Value]:

@@ -193,7 +193,12 @@ def _plain(value: Any) -> Any:
     return float(value) if isinstance(value, np.floating) else value
 
 
-def _drawn(plot: Plot) -> dict[str, bytes]:
+def picture_of(plot: Plot) -> bytes:
+    """Return a plot as a PNG file."""
+    return _drawn(plot, ("png",))["png"]
+
+
+def _drawn(plot: Plot, forms: Sequence[str] = FORMS) -> dict[str, bytes]:
     """Return the contents of the files by format, PNG first."""
     columns = plot.across
     rows = -(-len(plot.panels) // columns)
@@ -216,7 +221,7 @@ def _drawn(plot: Plot) -> dict[str, bytes]:
         _draw_legend(canvas, across)
         ConstrainedLayoutEngine().execute(canvas)  # once: a canvas would repeat it in each format
         contents = {}
-        for form in FORMS:
+        for form in forms:
             buffer = io.BytesIO()
             canvas.savefig(buffer, format=form, metadata=_NO_DATE[form])
             contents[form] = buffer.getvalue()

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 from cembench.report.content.evidence import Evidence
 from cembench.report.declared import declared_table, named
-from cembench.report.document import Column, Item, Plain, Section, Table, Text, Value, entry, words
-from cembench.results.columns import marks_explained
-from cembench.results.comparison import Comparison, compare, reference_of, references
+from cembench.report.document import Item, Plain, Section, Table, Text, Value, entry, words
+from cembench.report.given_tables import given_table
+from cembench.results.columns import against_reference, marks_explained
+from cembench.results.comparison import Comparison
 from cembench.results.frame import listed
 from cembench.results.intervals import Interval
 from cembench.results.machines import Marks
@@ -22,6 +23,8 @@ from cembench.running.estimate import Estimate
 #: Maximum number of causes listed.
 MOST_CAUSES = 8
 FEW_ROUNDS = "too few rounds"
+#: The figures of :func:`maps_table`, each before and after.
+MAP_FIGURES = ("E_C", "mean angle error", "folds")
 
 
 def results_table(evidence: Evidence) -> Section:
@@ -50,17 +53,10 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
     Without enough rounds for an interval, each surface has one row. None if there is nothing to
     compare.
     """
-    known = references(records, reference)
-    bases = [(record, reference_of(record, known)) for record in records]
-    compared = [
-        (record, comparison)
-        for record, base in bases
-        if base is not None and base.cell.algorithm != record.cell.algorithm
-        if (comparison := compare(record, base)) is not None
-    ]
+    pairs = zip(records, against_reference(records, reference), strict=True)
+    compared = [(record, one) for record, (_, one) in pairs if one is not None]
     if not compared:
         return None
-    title = f"Speedup of {reference} over the others: t / t_{reference} - 1"
     several = len({record.cell.solves for record, _ in compared}) > 1
     policies = [f" ({record.cell.solves})" if several else "" for record, _ in compared]
     found = [comparison for _, comparison in compared]
@@ -69,20 +65,16 @@ def speedups_table(records: Sequence[Record], reference: str) -> Table | None:
         lines: dict[str, dict[str, float]] = {}
         for (record, comparison), policy in zip(compared, policies, strict=True):
             lines.setdefault(record.cell.mesh + policy, {})[named(record)] = comparison.speedup
-        note = (
-            f"There are no intervals: they need {DEFAULT_ROUNDS} rounds "
-            f"(cembench run --rounds {DEFAULT_ROUNDS}, or --precision 5%)."
-        )
-        columns = [Column(name, form=".2f", lacking="not timed") for name in names]
         rows = [[mesh, *map(line.get, names)] for mesh, line in lines.items()]
-        return Table.of("speedups", title, ["surface", *columns], rows, notes=(note,))
-    speedup = (Column("speedup", form=".2f"), Column("95 % interval"))
-    titles: list[Column | str] = ["surface", "algorithm", *speedup, f"than {reference}"]
+        texts = {"reference": reference, "rounds": DEFAULT_ROUNDS}
+        each = {"names": names}
+        return given_table("speedups-alone", rows, texts, called="speedups", each=each)
     compared_rows: list[list[Plain]] = [
         [record.cell.mesh, named(record) + policy, one.speedup, _sure(one), one.verdict]
         for (record, _), policy, one in zip(compared, policies, corrected(found), strict=True)
     ]
-    return Table.of("speedups", title, titles, compared_rows, notes=tuple(_corrected_words(found)))
+    notes = _corrected_words(found)
+    return given_table("speedups", compared_rows, {"reference": reference}, notes=notes)
 
 
 def contest_tables(records: Sequence[Record], reference: str) -> list[Table]:
@@ -133,14 +125,8 @@ def changes_table(changes: Sequence[Change], *, paired: bool = False) -> Table:
     drift = () if paired else (_drift_words(changes),)
     comparisons = [change.comparison for change in changes]
     policies = len({change.after["solves"] for change in changes}) > 1
-    return Table.of(
+    return given_table(
         "changes",
-        "",
-        [
-            *("surface", "algorithm", *["solves"] * policies),
-            *(Column("before", form=".3g"), Column("after", form=".3g")),
-            *(Column("ratio", form=".2f"), Column("interval"), "verdict"),
-        ],
         [
             [
                 *(change.after["mesh"], change.after["algorithm"]),
@@ -150,26 +136,20 @@ def changes_table(changes: Sequence[Change], *, paired: bool = False) -> Table:
             ]
             for change, together in zip(changes, corrected(comparisons), strict=True)
         ],
+        each={"policies": ["solves"] * policies},
         notes=(*drift, *_corrected_words(comparisons), *_verdict_words(changes)),
     )
 
 
 def maps_table(cells: Sequence[tuple[Row, Row]]) -> Table:
     """Return the maps of both versions: their energies, angle errors, folds and statuses."""
-    names = {"E_C": ".6f", "mean angle error": ".3f", "folds": ".0f"}
-    columns = [
-        Column(when, name, form=form, lacking="no valid map")
-        for name, form in names.items()
-        for when in ("before", "after")
-    ]
     rows: list[list[Plain]] = []
     for before, after in cells:
         old, new = figures_of(before, after), figures_of(after, before)
-        figures = [one.get(name) for name in names for one in (old, new)]
+        figures = [one.get(name) for name in MAP_FIGURES for one in (old, new)]
         ended = [words(one["status"]) for one in (before, after)]
         rows.append([after["mesh"], after["algorithm"], *figures, *ended])
-    states = [Column(when, "status", numeric=False) for when in ("before", "after")]
-    return Table.of("maps", "", ["surface", "algorithm", *columns, *states], rows)
+    return given_table("maps", rows)
 
 
 def _verdict_words(changes: Sequence[Change]) -> list[str]:
@@ -214,8 +194,7 @@ def plan_table(lines: Sequence[tuple[Cell, int, str, Estimate | None]]) -> Table
             gib = f"{cost.memory_bytes / 2**30:.1f} GiB"
             costs = (f"{cost.call_seconds:.2g} s", f"{cost.seconds:.0f} s", gib)
         rows.append([cell.mesh, cell.algorithm, cell.solves, faces, *costs, state])
-    costs_columns = map(Column, ("faces", "a call", "in all", "memory"))
-    return Table.of("plan", "", ["surface", "algorithm", "solves", *costs_columns, "from"], rows)
+    return given_table("plan", rows)
 
 
 def many_table(evidence: Evidence) -> Table:

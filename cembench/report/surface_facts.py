@@ -23,7 +23,8 @@ from cembench.core.notices import NoticeKind, of_kind
 from cembench.mesh.datasets import CACHE_VARIABLE
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.registry import Algorithm, Registry, Surface
-from cembench.report.document import Column, Plain, Table, missing, words
+from cembench.report.document import Plain, Table, missing, words
+from cembench.report.given_tables import given_table
 from cembench.results.papers import paper_of
 from cembench.results.records import MeshFacts
 from cembench.running.plan import mesh_facts, provenances
@@ -159,11 +160,7 @@ def facts_table(known: Mapping[str, SurfaceFacts]) -> Table:
         counts = mesh.vertices, mesh.faces, mesh.boundary_vertices, mesh.non_delaunay_share
         rows.append([name, *counts, facts.conformal_factor_span, verdict])
     folders = dict.fromkeys(str(Path(facts.thumbnail).parent) for facts in known.values())
-    columns = [Column(title) for title in ("vertices", "faces", "boundary")]
-    columns += [Column("not Delaunay", form=".1%"), Column("span", form=".2g")]
-    span = "span: largest over smallest conformal factor of a triangle (ratio of lengths), by CEM"
-    notes = (span, f"thumbnails: {', '.join(folders)}")
-    return Table.of("surface-facts", "", ["surface", *columns, "in print"], rows, notes=notes)
+    return given_table("surface-facts", rows, {"folders": ", ".join(folders)})
 
 
 def _place(surface: Surface) -> Path:

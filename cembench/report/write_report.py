@@ -24,7 +24,6 @@ from cembench.report.content.report import Progress, build_report, is_of_the_pap
 from cembench.report.declared_plots import further
 from cembench.report.document import Report
 from cembench.report.export import export_rows, write_tables_csv
-from cembench.report.export_format import Format
 from cembench.report.plots import drawn
 from cembench.report.render.html import write_html
 from cembench.report.render.latex import write_latex
@@ -92,7 +91,7 @@ def write_report(
 
 
 def _write_all(report: Report, evidence: Evidence, folder: Path) -> None:
-    export_rows(list(evidence.rows.values()), folder / "records.csv", Format.csv)
+    export_rows(list(evidence.rows.values()), folder / "records.csv", "csv")
     write_tables_csv(report, folder)
     write_markdown(report, folder)
     write_latex(report, folder)

@@ -382,11 +382,10 @@ def rows(records: Sequence[Record], reference: str = REFERENCE) -> list[dict[str
     and so is `p`. `ratios` are those to the reference's seconds that decide, one for each round.
     """
     compared = against_reference(records, reference)
-    together = iter(corrected([one for _, one in compared if one is not None]))
+    together = corrected([one for _, one in compared])
     made = []
-    for record, (base, one) in zip(records, compared, strict=True):
+    for record, (base, one), both in zip(records, compared, together, strict=True):
         cpu = compare_cpu(record, base) if base is not None and one is not None else None
-        both = next(together) if one is not None else None
         ratios = paired_ratios(record, base) if base is not None and one is not None else []
         made.append(row(record) | _compared(base, one, both, cpu) | {"ratios": ratios})
     return made

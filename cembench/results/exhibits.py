@@ -53,19 +53,15 @@ class ExhibitTable(BaseModel):
     @classmethod
     def of(
         cls,
-        title: str,
-        columns: Mapping[str, tuple[str, str]],
+        declared: Mapping[str, Any],
         rows: Iterable[Mapping[str, Any]],
         **more: Any,
     ) -> Self:
-        """Return a table of rows by key; `columns` are the heading and format of each key."""
-        return cls(
-            title=title,
-            columns=tuple(heading for heading, _ in columns.values()),
-            rows=tuple(tuple(row.get(key) for key in columns) for row in rows),
-            forms={heading: form for heading, form in columns.values() if form},
-            **more,
-        )
+        """Return a table of rows by key; the `columns` declared are the headings of the keys."""
+        headings = declared["columns"]
+        held = tuple(tuple(row.get(key) for key in headings) for row in rows)
+        table = {**declared, "columns": tuple(headings.values()), "rows": held, **more}
+        return cls.model_validate(table)
 
     @model_validator(mode="after")
     def _rows_fit(self) -> Self:

@@ -13,12 +13,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from math import comb
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cembench.results.comparison import Comparison
 from cembench.results.intervals import ERROR
+
+C = TypeVar("C", Comparison, Comparison | None)
 
 
 def holm(chances: Sequence[float]) -> list[float]:
@@ -41,19 +44,22 @@ def holm(chances: Sequence[float]) -> list[float]:
     return adjusted
 
 
-def corrected(found: Sequence[Comparison]) -> list[Comparison]:
+def corrected(found: Sequence[C]) -> list[C]:
     """Return comparisons with verdicts that are all correct with probability 95 %.
 
     A verdict is kept if its own exact interval shows it, and if its p-value is also significant
     among so many (:mod:`cembench.results.rank_tests`). The intervals stay single ones: each
-    holds its ratio with 95 %, not all of them at once.
+    holds its ratio with 95 %, not all of them at once. None stays where there was no comparison.
     """
-    tested = [one.p for one in found if one.interval is not None]
+    tested = [one.p for one in found if one is not None and one.interval is not None]
     if len(tested) < 2:
         return list(found)
     chances = iter(holm(tested))
-    verdicts = []
+    verdicts: list[C] = []
     for one in found:
+        if one is None:
+            verdicts.append(one)
+            continue
         p = next(chances) if one.interval is not None else 1.0
         lost = p > ERROR and one.verdict in ("faster", "slower")
         verdicts.append(replace(one, p=p, verdict="undecided") if lost else replace(one, p=p))

@@ -407,8 +407,7 @@ class Outcome(BaseModel):
     @property
     def relative_energy(self) -> float | None:
         """E_C over the image's area; None if one of them is unknown."""
-        energy, area = (self.metrics.get(name) for name in ("conformal_energy", "image_area"))
-        return None if energy is None or not area else energy / area
+        return relative_energy(self.metrics)
 
     @property
     def worse_when_timed(self) -> float:
@@ -462,6 +461,12 @@ class Outcome(BaseModel):
         """Seconds by phase; they add up to :attr:`median_seconds`."""
         figure = self.median_seconds
         return next((r.phases for r in self.rounds if r.seconds == figure), {})
+
+
+def relative_energy(figures: Mapping[str, Any]) -> float | None:
+    """Return E_C over the image's area, by the names of metrics; None if one of them is unknown."""
+    energy, area = (figures.get(name) for name in ("conformal_energy", "image_area"))
+    return None if energy is None or not area else energy / area
 
 
 def not_ok(status: Status, *faults: Fault, **more: Any) -> Outcome:

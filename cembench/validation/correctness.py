@@ -12,6 +12,7 @@ from cembench.conformal.certificate import certify
 from cembench.conformal.metrics import (
     CIRCULAR,
     all_metrics,
+    angle_errors,
     boundary_circularity,
     flipped_triangles,
     image_area,
@@ -19,6 +20,7 @@ from cembench.conformal.metrics import (
 from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 from cembench.registry import Algorithm, Registry
+from cembench.results.records import relative_energy
 from cembench.running.map_promises import CIRCLE_TOLERANCE
 from cembench.validation import surfaces
 from cembench.validation.alignment import distance
@@ -139,7 +141,7 @@ def energy_vanishes(series: RefinementSeries) -> ValidationFinding:
 
 def angles_improve(series: RefinementSeries) -> ValidationFinding:
     """Check that the mean angle error falls under refinement."""
-    errors = [_figure(m, "angle_error_mean_deg") for m in series.maps]
+    errors = [float(angle_errors(m.mesh, _uv(m)).mean()) for m in series.maps]
     return _rate(series, "angle error", errors, ANGLE_ORDER, ANGLE_ROUNDING)
 
 
@@ -237,9 +239,9 @@ def same_under_backslash(reused: CheckedMap, anew: CheckedMap) -> ValidationFind
 def _largest_difference(first: CheckedMap, second: CheckedMap) -> float:
     """Return the largest relative difference of figures that motion, numbering and scale keep."""
     mine, other = all_metrics(first.mesh, _uv(first)), all_metrics(second.mesh, _uv(second))
-    if not (mine["image_area"] and other["image_area"]):
+    energies = relative_energy(mine), relative_energy(other)
+    if energies[0] is None or energies[1] is None:
         return np.inf  # a map to a point or a line
-    energies = [one["conformal_energy"] / one["image_area"] for one in (mine, other)]
     apart = [abs(mine[name] - other[name]) / max(abs(mine[name]), 1e-300) for name in _INVARIANT]
     folds = float(mine["flipped_triangles"] != other["flipped_triangles"])
     return float(max(*apart, abs(energies[0] - energies[1]), folds))
@@ -252,12 +254,8 @@ def _order(series: RefinementSeries, errors: Sequence[float]) -> float:
 
 
 def _relative_energy(mapped: CheckedMap) -> float:
-    area = abs(_figure(mapped, "image_area"))
-    return _figure(mapped, "conformal_energy") / area if area else np.inf
-
-
-def _figure(mapped: CheckedMap, name: str) -> float:
-    return float(all_metrics(mapped.mesh, _uv(mapped))[name])
+    found = relative_energy(all_metrics(mapped.mesh, _uv(mapped)))
+    return np.inf if found is None else abs(found)  # the area of a mirrored map is negative
 
 
 def _off_circle(mapped: CheckedMap) -> float:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path, PurePosixPath
 from typing import TYPE_CHECKING
 
 from cembench.report.document import (
-    Column,
     Figure,
     Findings,
     Gap,
@@ -22,6 +22,7 @@ from cembench.report.document import (
     entry,
     words,
 )
+from cembench.report.given_tables import given_table
 from cembench.report.palette import series_styles
 from cembench.report.plots import Axis, Plot, PlotPanel, PlotSeries, write_plot
 from cembench.results.columns import row
@@ -48,9 +49,7 @@ _TITLES = {
     "quality": "Is it better, is it faster?",
     "scaling": "How do its seconds grow?",
 }
-#: The ends of an interval, and why it may have none.
-_TOO_FEW = "too few surfaces or rounds"
-_ENDS = tuple(Column(end, "95 % interval", form=".3f", lacking=_TOO_FEW) for end in ("low", "high"))
+_table = partial(given_table, package="cembench.validation")
 
 
 def validation_text(validation: Validation) -> RenderableType:
@@ -149,16 +148,12 @@ def _items(validation: Validation, stage: str, records: Mapping[str, Record]) ->
 
 
 def _findings_table(stage: str, findings: Sequence[ValidationFinding]) -> Table:
-    titles = ("check", "found", "measured", "allowed")
     bad = [finding for finding in findings if not finding.ok]
     notes = [f"{f.name}: allowed: {f.allowed}; to do: {f.remedy}" for f in bad]
-    return Table.of(
-        f"{stage}-findings",
-        "Checks",
-        [Column(title, numeric=False, detail=title == "allowed") for title in titles],
-        [[one.name, _found(one), one.measured, one.allowed] for one in findings],
-        notes=tuple(dict.fromkeys(notes)),
-    )
+    rows: list[list[Plain]] = [
+        [one.name, _found(one), one.measured, one.allowed] for one in findings
+    ]
+    return _table("findings", rows, called=f"{stage}-findings", notes=dict.fromkeys(notes))
 
 
 def _found(finding: ValidationFinding) -> Value:
@@ -179,22 +174,8 @@ def _summary_table(compared: Sequence[BaselineComparison]) -> Table:
                 counts = [getattr(pairs, side, None) for side in ("lower", "equal", "higher")]
                 ratio = (pairs.ratio, *_ends(pairs.interval))
                 rows.append([f"{name} / {against.title}", *counts, *ratio])
-    whole = "of the rounds, not of the surfaces"
     timed = any(against.speed is not None for against in compared)
-    return Table.of(
-        "summary",
-        "Beside the baselines",
-        [
-            "figure",
-            *(Column(t, "surfaces", lacking=whole) for t in ("lower", "equal", "higher")),
-            Column("median ratio", form=".3f", lacking=_TOO_FEW),
-            *_ENDS,
-        ],
-        rows,
-        caption="Ratios of this algorithm's figure to the baseline's: below 1 is better. Equal "
-        "means within 1 %. The interval of E_C and angles is over the surfaces, that of the "
-        f"seconds over the rounds. {NOT_DETECTED if timed else ''}".rstrip(),
-    )
+    return _table("summary", rows, {"limits": f" {NOT_DETECTED}" if timed else ""})
 
 
 def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
@@ -203,24 +184,18 @@ def _ends(interval: Interval | None) -> tuple[float | None, float | None]:
 
 def _pairs_table(against: BaselineComparison, title: str, records: Mapping[str, Record]) -> Table:
     program = ("start", "solve") if against.solve_time else ()
-    columns: list[Column | str] = ["surface", Column("faces")]
-    for group in (against.energy_name, "mean angle error, °", "seconds"):
-        columns += [Column(title, group), Column(against.title, group, detail=True)]
-        own = program if group == "seconds" else ()
-        columns += [Column(name, group) for name in (*own, "ratio")]
-    notes = ["a dash: no valid map"]
-    if program:
-        notes.append(
-            "an external program: its seconds are the wall clock of a process, with its start and "
-            "its files; start is the same on a small mesh, and the ratio is of its solve time "
-            f"({against.solve_time})"
-        )
-    return Table.of(
-        f"against-{against.baseline}",
-        f"{title} and {against.title}, surface by surface",
-        columns,
-        [list(_pair_row(pair, records, program=bool(program))) for pair in against.pairs],
-        notes=tuple(notes),
+    note = (
+        "an external program: its seconds are the wall clock of a process, with its start and its "
+        "files; start is the same on a small mesh, and the ratio is of its solve time "
+        f"({against.solve_time})"
+    )
+    rows = [list(_pair_row(pair, records, program=bool(program))) for pair in against.pairs]
+    known = {"ours": title, "theirs": against.title, "energy": against.energy_name}
+    return _table(
+        *("against", rows, known),
+        called=f"against-{against.baseline}",
+        each={"program": program},
+        notes=[note] * bool(program),
     )
 
 
@@ -232,21 +207,18 @@ def _pair_row(pair: Pair, records: Mapping[str, Record], *, program: bool) -> It
     def measured(value: float | None, form: str, record: str = ours) -> Value:
         return entry(value, form, "no valid map", origin=origin, record=record)
 
-    def ratio(value: float | None) -> Value:
-        return entry(value, ".3f", _TOO_FEW)
-
     yield from (pair.surface, words(f"{pair.faces:,}"))
     yield measured(pair.energy, ".6f")
     yield measured(pair.baseline_energy, ".6f", theirs)
-    yield ratio(pair.energy_ratio)
+    yield pair.energy_ratio
     yield measured(pair.angle, ".3f")
     yield measured(pair.baseline_angle, ".3f", theirs)
-    yield ratio(pair.angle_ratio)
+    yield pair.angle_ratio
     yield measured(pair.seconds, ".4f")
     yield measured(pair.baseline_seconds, ".4f", theirs)
     if program:
         yield from (measured(s, ".4f") for s in (pair.start_seconds, pair.solve_seconds))
-    yield ratio(pair.speed.ratio if pair.speed else None)
+    yield pair.speed.ratio if pair.speed else None
 
 
 def _growth_table(compared: GrowthComparison) -> Table:
@@ -257,14 +229,8 @@ def _growth_table(compared: GrowthComparison) -> Table:
         at = dict(zip(growth.faces, growth.seconds, strict=True))
         cells = [entry(at.get(f), ".4f", "not timed", origin="surface") for f in sizes]
         rows.append([growth.what, *cells, growth.exponent, *_ends(growth.interval)])
-    columns = [Column(f"{faces:,}", "faces") for faces in sizes]
-    columns += [replace(column, form=".2f") for column in (Column("exponent"), *_ENDS)]
-    caption = (
-        "Exponent: of the seconds between the two largest sizes, the median over the rounds. "
-        f"{_CLOCKS[compared.clock]}"
-    )
-    title = "Seconds by number of triangles"
-    return Table.of("growth", title, ["what", *columns], rows, caption=caption)
+    titles = [f"{faces:,}" for faces in sizes]
+    return _table("growth", rows, {"clock": _CLOCKS[compared.clock]}, each={"sizes": titles})
 
 
 def _growth_plot(compared: GrowthComparison) -> Plot:

@@ -45,23 +45,16 @@ def finding(
     measured: str,
     *,
     ok: bool,
-    undecided: bool = False,
-    surface: str = "",
-    orders: tuple[float, float] | None = None,
     **known: Any,
 ) -> ValidationFinding:
-    """Return the finding of a check of `findings.toml`; `known` stand in its text in braces."""
+    """Return the finding of a check of `findings.toml`.
+
+    What is known beside is a field of the finding, or stands in its text in braces.
+    """
     said = {key: text.format_map(known) for key, text in _declared()[stage][name].items()}
-    return ValidationFinding(
-        stage=stage,
-        name=name,
-        surface=surface,
-        orders=orders,
-        ok=ok,
-        undecided=undecided,
-        measured=measured,
-        **said,
-    )
+    fields = {key: known[key] for key in known.keys() & ValidationFinding.model_fields.keys()}
+    parts: dict[str, Any] = fields | said
+    return ValidationFinding(stage=stage, name=name, measured=measured, ok=ok, **parts)
 
 
 @cache

@@ -31,7 +31,7 @@ from cembench.results.comparison import (
 )
 from cembench.results.intervals import Interval, median_interval
 from cembench.results.multiple_testing import corrected
-from cembench.results.records import FaultKind, Record
+from cembench.results.records import FaultKind, Record, relative_energy
 from cembench.results.regressions import NO_ANGLE, NO_ENERGY, TIE
 from cembench.validation.finding import Stage, ValidationFinding, finding
 
@@ -64,10 +64,7 @@ class Pair(BaseModel):
     @property
     def angle_ratio(self) -> float | None:
         """Our mean angle error over the baseline's; those that are rounding count as equal."""
-        ours, theirs = self.angle, self.baseline_angle
-        if ours is None or theirs is None:
-            return None
-        return max(ours, NO_ANGLE) / max(theirs, NO_ANGLE)
+        return _ratio(self.angle, self.baseline_angle, NO_ANGLE)
 
     surface: str
     faces: int
@@ -89,9 +86,13 @@ class Pair(BaseModel):
     @property
     def energy_ratio(self) -> float | None:
         """Our energy over the baseline's; None if one of them has none."""
-        if self.energy is None or self.baseline_energy is None:
-            return None
-        return max(self.energy, NO_ENERGY) / max(self.baseline_energy, NO_ENERGY)
+        return _ratio(self.energy, self.baseline_energy, NO_ENERGY)
+
+
+def _ratio(ours: float | None, theirs: float | None, least: float) -> float | None:
+    if ours is None or theirs is None:
+        return None
+    return max(ours, least) / max(theirs, least)
 
 
 class BaselineComparison(BaseModel):
@@ -142,7 +143,7 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     both = [(mine[name], theirs[name]) for name in names]
     pairs = tuple(
         _pair(*records, speed, relative=relative, gauge=gauge)
-        for records, speed in zip(both, _corrected(list(starmap(compare, both))), strict=True)
+        for records, speed in zip(both, corrected(list(starmap(compare, both))), strict=True)
     )
     return BaselineComparison(
         baseline=baseline,
@@ -159,16 +160,10 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
 
 def together(against: Sequence[BaselineComparison]) -> tuple[BaselineComparison, ...]:
     """Return the comparisons with verdicts on speed corrected for their number (Holm)."""
-    speeds = _corrected([a.speed for a in against])
+    speeds = corrected([a.speed for a in against])
     return tuple(
         a.model_copy(update={"speed": one}) for a, one in zip(against, speeds, strict=True)
     )
-
-
-def _corrected(found: Sequence[Comparison | None]) -> list[Comparison | None]:
-    """Return comparisons whose verdicts hold together; None without times."""
-    held = iter(corrected([one for one in found if one is not None]))
-    return [one and next(held) for one in found]
 
 
 def sides(ratios: Sequence[float]) -> PairedComparison:
@@ -260,14 +255,11 @@ def _has_gauge(record: Record) -> bool:
 
 
 def _energy(record: Record, *, relative: bool, gauge: bool) -> float | None:
-    worse = record.outcome.worse_when_timed  # quality and seconds are those of one map
-    if gauge:
-        energy = _valid(record).get(_GAUGE)
-        return None if energy is None else energy * worse
-    energy, area = (_valid(record).get(name) for name in ("conformal_energy", "image_area"))
-    if energy is None or not area:
-        return None
-    return worse * (energy / area if relative else energy)
+    known = _valid(record)
+    energy = known.get(_GAUGE if gauge else "conformal_energy")
+    energy = relative_energy(known) if relative else energy
+    # Quality and seconds are those of one map.
+    return None if energy is None else energy * record.outcome.worse_when_timed
 
 
 def _only_folds(record: Record) -> bool:

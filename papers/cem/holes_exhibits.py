@@ -30,6 +30,7 @@ from cembench.running.local import map_once
 from cembench.running.options import Options
 from cembench.running.plan import MeasurementSettings, plan_cells
 
+from .exhibit_tables import exhibit_table
 from .holes import STAND_IN, HoledMaps
 from .page import page
 
@@ -246,37 +247,10 @@ _FIGURES = (
     "boundary_circularity",
     "flipped_triangles",
 )
-#: The columns of the table: the heading of each key in the rows, and the format of its numbers.
-_TABLE = {
-    "mesh": ("surface", ""),
-    "holes": ("holes", "d"),
-    "algorithm": ("algorithm", ""),
-    "sweeps": ("sweeps", "d"),
-    "conformal_energy": ("E_C", ".4f"),
-    "angle_error_mean_deg": ("angle°", ".2f"),
-    "angle_error_sd_deg": ("SD°", ".2f"),
-    "boundary_circularity": ("circ.", ".0e"),
-    "circularity_before_rounding": ("before rounding", ".0e"),
-    "flipped_triangles": ("folds", "d"),
-    "iterations": ("iterations", "d"),
-    "seconds": ("seconds", ".2f"),
-    "status": ("status", ""),
-}
 
 
 def holes_table(rows: Sequence[dict[str, Any]], command: str) -> Exhibit:
     """Return a table of the figures of all surfaces as an exhibit, which `command` makes."""
-    table = ExhibitTable.of(
-        "Surfaces with holes",
-        _TABLE,
-        rows,
-        details=("holes", "before rounding", "iterations"),
-        notes=(
-            "angle° and SD° are the mean and the standard deviation of the angle errors in "
-            "degrees; circ. (circularity) is the largest distance of a boundary's image from its "
-            "fitted circle, relative to the radius; seconds are those of one call.",
-        ),
-    )
     standing = {row["mesh"] for row in rows} <= {STAND_IN}
     return Exhibit(
         name="holes",
@@ -285,6 +259,6 @@ def holes_table(rows: Sequence[dict[str, Any]], command: str) -> Exhibit:
         "other maps to a disk with holes.",
         command=command,
         origin="stand-in" if standing else "surface",
-        tables=(table,),
+        tables=(exhibit_table("holes", rows),),
         facts={"rows": rows},
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from time import perf_counter
@@ -18,6 +18,30 @@ from cembench.core.errors import AlgorithmFailed
 
 from .morph import morph as morph_surfaces
 
+Surfaces = Annotated[
+    list[str], typer.Argument(help="Two or more mesh files, or names from `list surfaces`.")
+]
+LandmarksFile = Annotated[
+    Path | None,
+    typer.Option(
+        help="CSV file, one row per landmark: name, vertex on each surface, from 0; or `none`."
+    ),
+]
+Output = Annotated[
+    list[Path],
+    typer.Option(
+        "-o", "--output", help="FILM.gif or .mp4, MESH.obj or .ply, FOLDER, .npz. Repeatable."
+    ),
+]
+Frames = Annotated[
+    int, typer.Option(min=2, max=100_000, help="Number of frames, played at 24 per second.")
+]
+Views = Annotated[str, typer.Option(help="Views of a film, comma-separated.")]
+Side = Annotated[int, typer.Option(min=64, max=2160, help="Side of a view, in pixels.")]
+AddTo = Annotated[
+    Path | None, typer.Option("--run", help="Add the pictures and figures to this run.")
+]
+
 
 @app.command(
     epilog="Examples:  cembench morph a.obj b.obj --landmarks ab.csv -o ab.gif  ·  "
@@ -27,40 +51,20 @@ from .morph import morph as morph_surfaces
 @from_api(morph_surfaces, without=("reporter",), lam="--lambda")
 def morph(
     call: Call,
-    surfaces: Annotated[
-        list[str], typer.Argument(help="Two or more mesh files, or names from `list surfaces`.")
-    ],
+    surfaces: Surfaces,
     *,
-    landmarks: Annotated[
-        Path | None,
-        typer.Option(
-            help="CSV file, one row per landmark: name, vertex on each surface, from 0; or `none`."
-        ),
-    ] = None,
-    output: Annotated[
-        list[Path],
-        typer.Option(
-            "-o", "--output", help="FILM.gif or .mp4, MESH.obj or .ply, FOLDER, .npz. Repeatable."
-        ),
-    ] = [],  # noqa: B006 - typer copies defaults
-    frames: Annotated[
-        int, typer.Option(min=2, max=100_000, help="Number of frames, played at 24 per second.")
-    ] = 48,
-    views: Annotated[
-        str, typer.Option(help="Views of a film, comma-separated.")
-    ] = "front,side,three-quarter",
-    size: Annotated[int, typer.Option(min=64, max=2160, help="Side of a view, in pixels.")] = 480,
-    run: Annotated[
-        Path | None, typer.Option("--run", help="Add the pictures and figures to this run.")
-    ] = None,
+    landmarks: LandmarksFile = None,
+    output: Output = [],  # noqa: B006 - typer copies defaults
+    frames: Frames = 48,
+    views: Views = "front,side,three-quarter",
+    size: Side = 480,
+    run: AddTo = None,
     force: Force = False,
     as_json: Json = False,
 ) -> None:
     """Write the films and meshes of the path, and print how well the surfaces are registered."""
     from cembench.core.overwriting import refuse_inputs
-    from cembench.registry import load_registry
     from cembench.results import run_folder
-    from cembench.running.plan import provenances
 
     from .morph_exhibits import write_exhibits
     from .morphing.drawing import check_views
@@ -97,14 +101,9 @@ def morph(
                 with _timed(seconds, kind):
                     write_path(morphed, places, frames, chosen_views, size, tell)
         if run is not None:
-            words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
-            words += ["-a", keywords["algorithm"]]
-            words += [] if keywords["faces"] is None else ["--faces", str(keywords["faces"])]
-            command = f"cembench morph {' '.join(words)} --run {run}"
-            registry = load_registry(keywords["plugins"])
-            roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
-            rows = tuple(roles[name].paper_row if name in roles else "" for name in surfaces)
-            written += write_exhibits(run, morphed, figures, command, rows, tell)
+            again = f"{_words(surfaces, landmarks, keywords)} --run {run}"
+            rows = _rows(surfaces, keywords["plugins"])
+            written += write_exhibits(run, morphed, figures, again, rows, tell)
     if as_json:
         print_json(figures | {"seconds": seconds, "written": [str(path) for path in written]})
         return
@@ -113,6 +112,24 @@ def morph(
         print_pair("written", path)
     if not written:
         out.print("Nothing was written; add -o FILM.gif to see it.", style="dim")
+
+
+def _words(surfaces: list[str], landmarks: Path | None, keywords: Mapping[str, Any]) -> str:
+    """Return the command that morphs these surfaces again."""
+    words = [*surfaces, *(["--landmarks", str(landmarks)] if landmarks else [])]
+    words += ["-a", keywords["algorithm"]]
+    words += [] if keywords["faces"] is None else ["--faces", str(keywords["faces"])]
+    return f"cembench morph {' '.join(words)}"
+
+
+def _rows(surfaces: list[str], plugins: Sequence[str]) -> tuple[str, ...]:
+    """Return the models of the paper that surfaces stand for, "" for others."""
+    from cembench.registry import load_registry
+    from cembench.running.plan import provenances
+
+    registry = load_registry(plugins)
+    roles = provenances(registry, [name for name in surfaces if name in registry.surfaces])
+    return tuple(roles[name].paper_row if name in roles else "" for name in surfaces)
 
 
 @contextmanager

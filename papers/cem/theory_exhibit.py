@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from cembench.core.atomic import write
+from cembench.core.arrays import Real
+from cembench.core.atomic import write_bytes
+from cembench.report.palette import PLAIN, series_styles
+from cembench.report.plots import Axis, Kind, Plot, PlotPanel, PlotSeries, picture_of
 from cembench.results.exhibits import (
     Exhibit,
     ExhibitPicture,
@@ -21,14 +21,9 @@ from cembench.results.exhibits import (
     write_exhibit,
 )
 
-from .boundary_operator import Trajectory
-from .theory_facts import LOOKS, TheoryFacts
+from .exhibit_tables import exhibit_table
+from .theory_facts import TheoryFacts
 
-#: Colours, which also differ in lightness: for (23) and (30), and for other algorithms.
-COLOURS = ("#1f5f99", "#c8553d")
-OTHERS = ("#3f7d4e", "#8a5a9e", "#b8860b", "#5f6b73", "#0f8b8d", "#a0405f")
-#: An axis with fewer values has ticks at 2 and 5 too.
-DECADES = 300
 #: Below this, the excess of an energy over the lowest is rounding.
 LEAST = 1e-12
 #: The file of the picture.
@@ -43,7 +38,7 @@ def exhibit_name(surface: str) -> str:
 def add_exhibit(run: Path, of_disk: TheoryFacts, command: str) -> None:
     """Add the exhibit of what was found to a run; `command` is the one that makes it again."""
     exhibit = theory_exhibit(of_disk, command)
-    _write_plots(place_of(run, exhibit.name, PICTURE), of_disk)
+    write_bytes(place_of(run, exhibit.name, PICTURE), picture_of(_plot(of_disk)))
     write_exhibit(run, exhibit)
 
 
@@ -92,91 +87,51 @@ def _summary(facts: dict[str, Any]) -> str:
 
 
 def _tables(facts: dict[str, Any]) -> Iterator[ExhibitTable]:
-    checks = {"name": ("what", ""), "source": ("where", ""), "holds": ("holds", "")}
-    checks |= {"figure": ("figure", ".3g"), "meaning": ("meaning", "")}
     for part in ("premises", "statements"):
         rows = [{**check, "holds": "yes" if check["holds"] else "NO"} for check in facts[part]]
-        yield ExhibitTable.of(part.capitalize(), checks, rows, details=("meaning",))
-    looks = {f"after_{k}": (f"after {k}", ".6f") for k in LOOKS} | {"last": ("last", ".6f")}
-    columns = {"name": ("iteration", ""), **looks, "iterations": ("iterations", "d")}
-    title = "Conformal energy E_C"
-    yield ExhibitTable.of(title, columns, facts["energies"], details=("iterations",))
-    yield _certificate_table(facts["certificate"])
+        yield exhibit_table("checks", rows, title=part.capitalize())
+    yield exhibit_table("energies", facts["energies"])
+    certificate = facts["certificate"]
+    if "missing" in certificate:
+        yield exhibit_table("certificate", (), notes=(certificate["missing"],), forms={})
+        return
+    modulus, reciprocal = certificate["modulus"], certificate["reciprocal_error"]
+    rows = [
+        {"name": "surface, at least", "modulus": certificate["lower"]},
+        {"name": "surface, at most", "modulus": certificate["upper"]},
+        {"name": "middle of both", "modulus": modulus, "off": reciprocal},
+    ]
+    for name, off in certificate["off"].items():
+        own = None if off is None else modulus * (1 + off)
+        rows.append({"name": name, "modulus": own, "off": off})
+    yield exhibit_table("certificate", rows)
 
 
-def _certificate_table(of_disk: dict[str, Any]) -> ExhibitTable:
-    title = "Modulus of the surface with four boundary points"
-    columns = ("four boundary points", "modulus", "off by")
-    if "missing" in of_disk:
-        return ExhibitTable(title=title, columns=columns, rows=(), notes=(of_disk["missing"],))
-    modulus = of_disk["modulus"]
-    return ExhibitTable(
-        title=title,
-        columns=columns,
-        rows=(
-            ("surface, at least", of_disk["lower"], None),
-            ("surface, at most", of_disk["upper"], None),
-            ("middle of both", modulus, of_disk["reciprocal_error"]),
-            *(
-                (name, None if off is None else modulus * (1 + off), off)
-                for name, off in of_disk["off"].items()
-            ),
-        ),
-        forms={"modulus": ".5f", "off by": "+.1e"},
-    )
-
-
-def _write_plots(path: Path, of_disk: TheoryFacts) -> None:
-    """Draw the spectrum of K, the energies by iteration, and the step lengths as a PNG file."""
-    facts = of_disk.facts
-    figure = Figure(figsize=(13, 4.2), dpi=120, layout="constrained")
-    FigureCanvasAgg(figure)
-    figure.suptitle(f"{facts['mesh']}: {_size(facts)}", fontweight="bold")
-    spectrum, energy, steps = figure.subplots(1, 3)
-    _draw_spectrum(spectrum, np.asarray(of_disk.spectrum))
-    _draw_energies(energy, of_disk.trajectories, of_disk.others)
-    _draw_steps(steps, of_disk.trajectories, facts["rate_predicted"])
-    write(path, lambda file: figure.savefig(file, format="png"))
-
-
-def _draw_spectrum(axes: Axes, values: np.ndarray) -> None:
-    axes.plot(np.arange(2, len(values) + 1), 1 - values[1:], ".", color=COLOURS[0], markersize=4)
-    axes.set(xscale="log", yscale="log", xlabel="number k", ylabel="1 - eigenvalue of K")
-    axes.set_title("Eigenvalues of K crowd at 1", fontsize=10)
-    few = len(values) < DECADES
-    axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5) if few else (1,)))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:,.0f}"))
-    axes.xaxis.set_minor_formatter(NullFormatter())  # otherwise labels overlap
-    axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _draw_energies(
-    axes: Axes, trajectories: Mapping[str, Trajectory], others: Mapping[str, Sequence[float]]
-) -> None:
-    curves = {name: path.energies for name, path in trajectories.items()}
-    curves |= {name: np.asarray(history) for name, history in others.items()}
+def _plot(of_disk: TheoryFacts) -> Plot:
+    """Return the spectrum of K, the energies by iteration, and the step lengths as a plot."""
+    facts, paths = of_disk.facts, of_disk.trajectories
+    curves = {name: path.energies for name, path in paths.items()}
+    curves |= {name: np.asarray(history) for name, history in of_disk.others.items()}
     lowest = min(float(curve.min()) for curve in curves.values())
-    colours = dict(zip(trajectories, COLOURS, strict=False))
-    colours |= {name: OTHERS[k % len(OTHERS)] for k, name in enumerate(others)}
-    for name, curve in curves.items():
-        above = np.maximum(curve - lowest, LEAST)
-        axes.plot(np.arange(len(curve)), above, color=colours[name], label=name)
-    axes.set(yscale="log", xlabel="iteration", ylabel="E_C less the lowest found")
-    axes.set_title("Conformal energy", fontsize=10)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(frameon=False, fontsize=9)
+    styles = dict(zip(curves, series_styles([]).values(), strict=False))
 
+    def line(name: str, start: int, y: Real, kind: Kind = "line") -> PlotSeries:
+        look = styles.get(name, PLAIN)
+        numbers = range(start, start + len(y))
+        return PlotSeries(name, numbers, y.tolist(), kind, look, named=kind == "line")
 
-def _draw_steps(axes: Axes, trajectories: Mapping[str, Trajectory], rate: float) -> None:
-    for (name, path), colour in zip(trajectories.items(), COLOURS, strict=False):
-        axes.plot(np.arange(1, len(path.steps) + 1), path.steps, color=colour, label=name)
-    first = next(iter(trajectories.values()))
-    if np.isfinite(rate) and len(first.steps):
-        k = np.arange(1, len(first.steps) + 1)
-        line = first.steps[-1] * rate ** (k - k[-1])
-        label = f"predicted, {rate:.4f} a step"
-        axes.plot(k, line, "--", color="#7a8894", linewidth=1, label=label)
-    axes.set(yscale="log", xlabel="iteration", ylabel="r.m.s. step of the boundary")
-    axes.set_title("The gap of K sets the speed", fontsize=10)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(frameon=False, fontsize=9)
+    spectrum = line("eigenvalues", 2, 1 - np.asarray(of_disk.spectrum)[1:], "points")
+    energies = [line(name, 0, np.maximum(y - lowest, LEAST)) for name, y in curves.items()]
+    steps = [line(name, 1, path.steps) for name, path in paths.items()]
+    rate, lengths = facts["rate_predicted"], next(iter(paths.values())).steps
+    if np.isfinite(rate) and len(lengths):
+        predicted = lengths[-1] * rate ** np.arange(1 - len(lengths), 1.0)
+        steps.append(line(f"predicted, {rate:.4f} a step", 1, predicted))
+    iteration, log = Axis("iteration"), partial(Axis, log=True)
+    panels = (
+        (log("number k"), log("1 - eigenvalue of K"), [spectrum], "Eigenvalues of K crowd at 1"),
+        (iteration, log("E_C less the lowest found"), energies, "Conformal energy"),
+        (iteration, log("r.m.s. step of the boundary"), steps, "The gap of K sets the speed"),
+    )
+    title = f"{facts['mesh']}: {_size(facts)}"
+    return Plot(PICTURE, title, tuple(PlotPanel(x, y, tuple(s), name) for x, y, s, name in panels))

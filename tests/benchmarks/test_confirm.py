@@ -8,7 +8,6 @@ import pytest
 from benchmarks import confirm as study
 from benchmarks import origins, stale
 from cembench.report.export import export_rows
-from cembench.report.export_format import Format
 from cembench.results.columns import rows
 from tests.results.simulated_machines import machine_run
 
@@ -30,7 +29,7 @@ def kept(tmp_path, monkeypatch):
         if as_run:
             shutil.copytree(run.folder, tmp_path / "reports/a")
         else:
-            export_rows(held, tmp_path / "reports/a/records.csv", Format.csv)
+            export_rows(held, tmp_path / "reports/a/records.csv", "csv")
         section = study.confirm(tmp_path / "reports/a", run.folder, command="cembench run")
         return section, json.loads(file.read_text())["reports/a"]
 

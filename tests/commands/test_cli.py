@@ -181,13 +181,13 @@ def test_doctor_tells_of_remeshing_and_of_what_was_fetched(cli, monkeypatch, tmp
 def test_a_check_that_breaks_is_a_finding(monkeypatch):
     from importlib.metadata import EntryPoint
 
-    from cembench.api.doctor import CHECKS, examine
+    from cembench.api.doctor import CHECKS, doctor
 
     broken = EntryPoint("mine", "cembench.core.clock:nothing", CHECKS)
     monkeypatch.setattr(
         "cembench.api.doctor.entry_points", lambda group: [broken] if group == CHECKS else []
     )
-    (found,) = [finding for finding in examine() if finding.name == "mine"]
+    (found,) = [finding for finding in doctor() if finding.name == "mine"]
     assert not found.ok
     assert not found.required
     assert "AttributeError" in found.detail

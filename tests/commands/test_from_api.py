@@ -110,6 +110,22 @@ SAME = {
         dict(cembench.benchmark([cap], ["lscm"], rounds=1).asked[0].outcome.metrics),
         said(cli, "peers", "--mesh", cap, "-a", "lscm", "-o", "p")["cells"][0],
     ),
+    "status": lambda cli, cap: (
+        dict(cembench.Run(measured("one", cap)).status().about),
+        said(cli, "status", "one"),
+    ),
+    "show": lambda cli, cap: (
+        {"key": cembench.Run(measured("one", cap)).show("cap/cem")[0].cell.key},
+        said(cli, "show", "cap/cem", "--run", "one")[0],
+    ),
+    "merge": lambda cli, cap: (
+        {"cells": cembench.merge([measured("one", cap)], "both").cells},
+        said(cli, "merge", "one", "-o", "again"),
+    ),
+    "export": lambda cli, cap: (
+        {"output": str(cembench.Run(measured("one", cap)).export())},
+        said(cli, "export", "one"),
+    ),
     "report": lambda cli, cap: (
         {"title": report_of(cap).title},
         said(cli, "report", "measured"),

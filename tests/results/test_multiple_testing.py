@@ -23,6 +23,7 @@ def test_a_verdict_that_many_comparisons_do_not_bear_is_taken_back():
     verdicts = [one.verdict for one in together]
     assert verdicts == ["slower", "undecided", "undecided", "too few rounds"]
     assert together[1].interval == unsure.interval
+    assert corrected([sure, None, unsure, unsure, few]) == [together[0], None, *together[1:]]
 
 
 def test_of_a_hundred_equal_algorithms_one_is_called_different_in_5_percent_of_tables():

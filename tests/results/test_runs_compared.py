@@ -5,7 +5,6 @@ import pytest
 
 from cembench.core.errors import RecordError
 from cembench.report.export import export_rows
-from cembench.report.export_format import Format
 from cembench.report.run_tables import changes_table
 from cembench.results import runs_compared
 from cembench.results.columns import rows
@@ -69,7 +68,7 @@ def test_a_report_stands_for_its_run(tmp_path, packed):
     ]
     run, file = rows(records), tmp_path / "records.csv"
     assert not has_records(tmp_path)
-    export_rows(run, file, Format.csv)
+    export_rows(run, file, "csv")
     if packed:
         (tmp_path / "records.csv.xz").write_bytes(lzma.compress(file.read_bytes()))
         file.unlink()
@@ -85,7 +84,7 @@ def test_records_that_are_no_table_are_refused(tmp_path):
     with pytest.raises(RecordError, match="neither"):
         read_rows(tmp_path)
     packed, file = tmp_path / "records.csv.xz", tmp_path / "records.csv"
-    export_rows(rows([record_of([1.0] * 6)]), file, Format.csv)
+    export_rows(rows([record_of([1.0] * 6)]), file, "csv")
     whole = lzma.compress(file.read_bytes())
     for data in (b"not packed", whole[:-20], lzma.compress(b"a,b\n\xff,2\n"), b""):
         packed.write_bytes(data)

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from cembench.report.content.evidence import ANGLE, DISK, Evidence, MeasuredSurface
 from cembench.report.declarations import Declaration, own, parsed
-from cembench.report.document import Column, Table
+from cembench.report.document import Table
+from cembench.report.given_tables import given_table
 from cembench.results.frame import evaluate
 
 if TYPE_CHECKING:
@@ -100,11 +101,4 @@ def worst_table(evidence: Evidence, surfaces: Sequence[MeasuredSurface]) -> Tabl
                 " ".join(one.help for one in chosen) or "-",
             ]
         )
-    sizes = (Column("triangles", form=",.0f"), Column("best map", form=".2f"))
-    return Table.of(
-        "worst-causes",
-        f"Why the {len(surfaces)} hardest surfaces are hard",
-        ["surface", "family", *sizes, "causes", "what helps"],
-        rows,
-        caption="Best map: the smallest mean angle error of a valid map, in degrees.",
-    )
+    return given_table("worst-causes", rows, {"number": len(surfaces)})

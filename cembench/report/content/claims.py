@@ -16,7 +16,8 @@ from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.inspection import Inspection
 from cembench.report.content.printed_tables import corrected_rate
-from cembench.report.document import ORIGINS, VERDICTS, Claim, Column, Judged, Table, Verdict
+from cembench.report.document import ORIGINS, VERDICTS, Claim, Judged, Table, Verdict
+from cembench.report.given_tables import given_table
 from cembench.report.plot_rows import printed
 from cembench.results.columns import FITTED
 from cembench.results.families import FEWEST_FAMILIES, family_means, share_interval
@@ -236,19 +237,9 @@ def at_a_glance(tested: Sequence[Claim]) -> Table:
         parts = [claim.parts.get(origin) for origin in headings]
         cells = [part.counted_verdict if part else None for part in parts]
         rows.append((claim.plain, *cells, claim.place))
-    columns = [
-        Column(title, numeric=False, lacking="nothing to test it on")
-        for title in ("claim", *headings.values(), "place")
-    ]
-    caption = (
-        "How many tests hold. In brackets is the 95 % interval of the share of families of "
-        f"surfaces on which it holds, where there are at least {FEWEST_FAMILIES}. The last column "
-        "but one is a control: the same test on what the paper prints. Figures to which stand-ins "
-        "were fitted decide nothing."
-    )
-    return Table.of(
-        "claims-at-a-glance", "The claims at a glance", columns, rows, origin="", caption=caption
-    )
+    on = {"origins": [*headings.values()]}
+    texts = {"families": FEWEST_FAMILIES}
+    return given_table("claims-at-a-glance", rows, texts, each=on, origin="")
 
 
 def in_short(tested: Sequence[Claim]) -> Table:
@@ -274,8 +265,7 @@ def in_short(tested: Sequence[Claim]) -> Table:
         for what, claims in lists.items()
         if claims
     ]
-    titles = ("claims", "which")
-    return Table.of("claims-in-short", "The claims in short", titles, rows, origin="")
+    return given_table("claims-in-short", rows, origin="")
 
 
 def _case(

@@ -16,7 +16,6 @@ from cembench.report.content.standings import surfaces_words
 from cembench.report.declared import declared_table
 from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
-    Column,
     Gallery,
     Item,
     Section,
@@ -26,6 +25,7 @@ from cembench.report.document import (
     missing,
     words,
 )
+from cembench.report.given_tables import given_table
 from cembench.report.plots import drawn
 from cembench.results.families import votes
 from cembench.results.intervals import ERROR
@@ -140,17 +140,9 @@ def _table(
         (words(a.label), *(entries.get((a.label, b.label), words("")) for b in series))
         for a in series
     ]
-    return Table(
-        name,
-        title,
-        (Column("better", numeric=False), *(Column(s.label, "than") for s in series)),
-        tuple(rows),
-        "Number of families on most of whose surfaces the algorithm of the row beats that of the "
-        "column, out of those with surfaces that both were tried on; ties are left out. A cell "
-        "that did not end ok loses to one that did. A star marks a number beyond chance, with a "
-        f"confidence of {100 * (1 - ERROR):.0f} %{_together(len(pairs))}. Only families are "
-        "counted; the size of the difference does not matter.",
-    )
+    labels = {"algorithms": [s.label for s in series]}
+    texts = {"title": title, "confidence": 100 * (1 - ERROR), "tests": _together(len(pairs))}
+    return given_table("wins", rows, texts, called=name, each=labels)
 
 
 def _together(pairs: int) -> str:

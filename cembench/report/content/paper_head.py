@@ -19,6 +19,7 @@ from cembench.report.document import (
     missing,
     words,
 )
+from cembench.report.given_tables import given_table
 from cembench.results.families import enough_rounds, rate_interval
 from cembench.results.records import MeshOrigin
 
@@ -87,7 +88,6 @@ def origins_of(evidence: Evidence) -> dict[MeshOrigin, str]:
 def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
     """Return the main claims: what is printed, and what holds here by the origin of surfaces."""
     origins = origins_of(evidence)
-    titles = ("claim", "printed", *(origins.values() or ["here"]))
     rated = evidence.paper.stated.get("rate")
     rows = list(_rate_rows(evidence, list(origins)))[:ROWS] if rated else []
     rows += list(_claim_rows(evidence, tested, list(origins)))[: ROWS - len(rows)]
@@ -100,7 +100,8 @@ def head_table(evidence: Evidence, tested: Sequence[Claim]) -> Table | None:
         "printed for these models."
     )
     notes = (note,) if rated else ()
-    return Table.of("head", "The main claims", titles, rows, origin="", notes=notes)
+    on = {"origins": [*origins.values()] or ["here"]}
+    return given_table("head", rows, each=on, origin="", notes=notes)
 
 
 def _rate_rows(evidence: Evidence, origins: Sequence[MeshOrigin]) -> Iterator[list[Plain]]:

@@ -10,6 +10,7 @@ every model equally.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING
 
@@ -24,7 +25,8 @@ from cembench.report.by_surface import (
 )
 from cembench.report.content.evidence import AlgorithmSeries, Evidence
 from cembench.report.content.policies import sure_speedups
-from cembench.report.document import Column, Table, entry, missing, words
+from cembench.report.document import Table, entry, missing, words
+from cembench.report.given_tables import given_table
 from cembench.results.columns import COLUMNS, FrameColumn, worded
 from cembench.results.expressions import with_words
 from cembench.results.papers import Paper
@@ -137,8 +139,6 @@ def averages_table(evidence: Evidence, number: int, policy: str, origin: MeshOri
     Stated, printed for all models or for these, measured.
     """
     paper = evidence.paper
-    titles = ("stated", "printed, all", "printed, these", "here")
-    columns = [Column(title, a.upper()) for a in paper.compared for title in titles]
     stated = {0: paper.stated.get("rate", {}), 2: paper.stated.get("saving", {})}
     rows, counts, work = [], [words("n, models counted")], []
     sets = {}
@@ -169,24 +169,15 @@ def averages_table(evidence: Evidence, number: int, policy: str, origin: MeshOri
         for table, model, algorithm in paper.misprints
         if table == number and (rate := corrected_rate(paper, model, algorithm)) is not None
     )
-    return Table(
-        name=f"averages-on-{origin}s{policy_suffix(policy, evidence)}",
-        title=f"Averages of Table {number} {ON[origin]}, in both readings"
-        f"{in_policy(evidence, policy)}",
-        columns=(Column("reading", numeric=False), *columns),
-        rows=(*rows, tuple(counts)),
-        caption=(
-            "In the mean of rates, single large ratios dominate; the geometric mean and the mean "
-            "of the savings weight every model equally. 'Printed, these' are the printed rates of "
-            "the models that were measured here too. Each model counts once: if it was measured "
-            "itself, its stand-in is left out."
-        ),
-        notes=(
-            *replaced,
-            f"{len(absent_models(evidence))} of the paper's models are not in this run",
-        ),
-        footer_rows=1,
+    absent = f"{len(absent_models(evidence))} of the paper's models are not in this run"
+    known = {"number": number, "on": ON[origin], "in_policy": in_policy(evidence, policy)}
+    table = given_table(
+        *("averages", (*rows, counts), known),
+        called=f"averages-on-{origin}s{policy_suffix(policy, evidence)}",
+        each={"algorithms": [a.upper() for a in paper.compared]},
+        notes=(*replaced, absent),
     )
+    return replace(table, footer_rows=1)
 
 
 def printed_rates(paper: Paper, algorithm: str, models: Sequence[str] | None = None) -> list[float]:

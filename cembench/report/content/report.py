@@ -30,7 +30,6 @@ from cembench.report.declared_plots import declared_plot
 from cembench.report.document import (
     ORIGINS,
     Claim,
-    Column,
     Figure,
     Item,
     Plain,
@@ -40,6 +39,7 @@ from cembench.report.document import (
     Text,
     words,
 )
+from cembench.report.given_tables import given_table
 from cembench.report.plot_rows import exponents_table, printed
 from cembench.report.plots import drawn
 from cembench.report.shared_drawing import each
@@ -81,9 +81,7 @@ def _table(evidence: Evidence) -> Table:
         surfaces = len({record.cell.mesh_hash for record in own})
         cpu = str(about.get("cpu") or "-")
         rows.append([letter, name or "not named", cpu, surfaces, len(own)])
-    counts = Column("surfaces"), Column("cells")
-    columns = ("mark", "machine", "processor", *counts)
-    return Table.of("machines", "Machines of this run", columns, rows, origin="")
+    return given_table("machines", rows, origin="")
 
 
 #: Receives progress: a text, the number of finished steps, and their total.

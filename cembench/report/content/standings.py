@@ -16,7 +16,8 @@ import numpy as np
 from cembench.core.names import slug
 from cembench.report.content.evidence import ANGLE, AS_GOOD, DEGREES, DISK, Evidence
 from cembench.report.declarations import own
-from cembench.report.document import Column, Finding, Plain, Table, Value, missing
+from cembench.report.document import Finding, Plain, Table, Value, missing
+from cembench.report.given_tables import given_table
 from cembench.results.comparison import (
     Comparison,
     compare_ratios,
@@ -194,14 +195,7 @@ def contests_of(evidence: Evidence, policy: str) -> list[dict[str, Any]]:
 
 def standings(contest: Mapping[str, Any]) -> Table:
     """Return the algorithms of a contest in a row each, the smallest angle errors first."""
-    order, good = contest["order"], contest["good"]
-    columns: list[Column | str] = [
-        "algorithm",
-        *(Column("valid maps"), Column("mean angle error", unit="°", form=".2f")),
-        *(Column(f"error over {contest['best']}'s"), Column("smallest on", detail=True)),
-        Column(f"within {contest['within']} % on", detail=True),
-        Column(f"time over {good[0]}'s"),
-    ]
+    good = contest["good"]
     rows = list(_ranked(contest))
     fitted, few = "stand-ins were fitted to its angle errors", "too few valid maps to be compared"
     rows += [
@@ -210,15 +204,8 @@ def standings(contest: Mapping[str, Any]) -> Table:
     ]
     name = "standings" if contest["target"] == DISK else f"standings-{slug(contest['target'])}"
     but = "" if len(good) > 1 else " No other is about as good."
-    note = (
-        f"Over {contest['on']}; solves: {contest['policy']}. The smallest are the angle errors of "
-        f"{order[0]}. The fastest is {good[0]}, of the maps about as good as the best: at most "
-        f"{AS_GOOD} times the smallest error, or {DEGREES}° larger, on every surface.{but} In "
-        f"brackets are 95 % intervals, of angles where there are {FEWEST_FAMILIES} families of "
-        "surfaces."
-    )
-    title = f"{contest['title']}, ranked by their angle errors"
-    return Table.of(name, title, columns, rows, notes=(note,))
+    texts = {"fastest": good[0], "but": but, "fewest": FEWEST_FAMILIES}
+    return given_table("standings", rows, {**contest, **texts}, called=name)
 
 
 def rank_tables(contests: Sequence[Mapping[str, Any]]) -> list[Table]:

@@ -13,6 +13,7 @@ from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.results.exhibits import ExhibitTable
 
+from ..exhibit_tables import exhibit_table
 from .registration import Registration
 
 Ints = NDArray[np.int64]
@@ -111,36 +112,7 @@ def distances_to(points: Real, V: Real, F: Ints) -> Real:
     return np.sqrt(squared)
 
 
-#: The figures of a registration: the heading and the format of each.
-_REGISTRATION = {
-    "surface": ("surface", ""),
-    "steps": ("steps to lambda", "d"),
-    "landmark_error_share": ("landmark error / size", ".2e"),
-    "dirichlet_energy": ("E_D", ".4f"),
-    "dilatation_mean": ("mean dilatation", ".2f"),
-    "dilatation_max": ("maximum dilatation", ".1f"),
-    "flipped_triangles": ("folds", "d"),
-    "distance_mean_edges": ("mean distance / edge", ".3f"),
-    "hausdorff_edges": ("Hausdorff / edge", ".2f"),
-}
-
-
 def tables_of(figures: dict[str, Any]) -> tuple[ExhibitTable, ExhibitTable]:
     """Return the metrics of the registrations, one row per surface, and those of the path."""
     rows = [{**row, "steps": len(row["lambdas"])} for row in figures["registrations"]]
-    registrations = ExhibitTable.of(
-        "Registrations",
-        _REGISTRATION,
-        rows,
-        notes=(
-            "Distances between the carried surface and its target, the larger of both ways, over "
-            "all vertices and 50,000 random points each, in mean edges of the target. A dash: no "
-            "landmarks, or a triangle of almost no area, whose dilatation is not finite.",
-        ),
-    )
-    path = {
-        "largest_acceleration_share": ("largest acceleration of a vertex", ".3f"),
-        "largest_step_share": ("largest step between frames", ".4f"),
-    }
-    note = "In sizes of the first surface; the time from the first to the last is 1."
-    return registrations, ExhibitTable.of("Smoothness of the path", path, [figures], notes=(note,))
+    return exhibit_table("registrations", rows), exhibit_table("path", [figures])
