@@ -7,7 +7,8 @@ from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh
 from cembench.conformal.beltrami import beltrami_coefficients
-from cembench.conformal.even_weights import _gradients, evened, is_graded
+from cembench.conformal.even_weights import _gradients, evened
+from cembench.conformal.graded_meshes import is_graded
 from cembench.conformal.metrics import angle_errors, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
 from tests import gallery
