@@ -68,10 +68,3 @@ def test_a_conformal_map_stays():
     uv, taken = evened(mesh, z, 5)
     assert taken == 0
     np.testing.assert_array_equal(uv, z)
-
-
-def test_areas_that_vary_widely_are_enough_without_needles():
-    i, j, F = gallery.grid(24, 24)
-    turn, radius = 2 * i / 24, np.exp(-4 * j / 24)
-    x, y = radius * np.cos(turn), radius * np.sin(turn)
-    assert is_graded(DiskMesh.from_arrays(np.stack([x, y, 0 * x], axis=1), F[:, ::-1]))
