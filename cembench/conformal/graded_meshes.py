@@ -37,14 +37,6 @@ USUAL_STEPS = 2
 #: If more degrees of mean angle error are left there, or with that share of needles alone,
 #: triangles are split so many times, as long as there are not more of them than this.
 POOR, USUAL_SPLITS, MOST_TRIANGLES = 5.0, 2, 25_000
-#: What extras have of the repair of the mesh with smaller triangles, which is not the given one.
-OF_REPAIRS = (
-    "fold_repairs",
-    "folded_before_repair",
-    "before_repair",
-    "last_resort",
-    "refused_repair",
-)
 
 
 def better_if_graded(method: Callable[..., Parameterization]) -> Callable[..., Parameterization]:
@@ -127,7 +119,7 @@ def _by_split_surface(
         V, F = igl.upsample(mesh.V, mesh.F, splits)
         fine = DiskMesh.trusted(V, F.astype(np.int64))
     try:
-        made = method(fine, **parameters)
+        made = method(fine, **parameters | {"repair": False})  # the given mesh's folds are repaired
     except AlgorithmFailed:
         return None
     repair = parameters.get("repair", True)
@@ -135,8 +127,7 @@ def _by_split_surface(
         uv, repairs = valid_map(mesh, made.uv[: mesh.n].copy())
     else:
         uv, repairs = accepted_repair(mesh, made.uv[: mesh.n].copy(), repair=repair)
-    own = {name: value for name, value in made.extras.items() if name not in OF_REPAIRS}
-    return replace(made, uv=uv, extras=own | repairs)
+    return replace(made, uv=uv, extras=made.extras | repairs)
 
 
 def _evened(mesh: DiskMesh, made: Parameterization, steps: int) -> Parameterization:
