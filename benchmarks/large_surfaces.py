@@ -1,9 +1,8 @@
-"""What METIS and a second thread give on large surfaces."""
+"""What METIS gives on large surfaces."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import product
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -13,42 +12,40 @@ from benchmarks.pages import Section, Table
 from cembench.linear_algebra.backends import available_backends
 
 ORDERS = {"cvxopt": "AMD", "cvxopt-metis": "METIS"}
-THREADS = (1, 2)
 PHASES = ("ordering", "symbolic", "factorisation")
 LAYOUT = """
-| surface | triangles | order of rows | threads | seconds | ordering, analysis, factorisation \
+| surface | triangles | order of rows | seconds | ordering, analysis, factorisation \
 | entries of the factor, M | peak GiB |
-|---|---:|---|---:|---:|---:|---:|---:|
-| {surface} | {faces:,} | {order} | {threads} | {seconds:.3g} | {factoring:.3g} \
+|---|---:|---|---:|---:|---:|---:|
+| {surface} | {faces:,} | {order} | {seconds:.3g} | {factoring:.3g} \
 | {million_entries:.0f} | {peak_gib:.2f} |"""
 
 
 def large_surfaces(
     surfaces: Sequence[str] = ("1000000",), *, algorithm: str = "direct-cem", rounds: int = 3
 ) -> Section:
-    """Measure what METIS and a second thread give on large surfaces.
+    """Measure what METIS gives on large surfaces.
 
     Every round is a fresh process that calls one algorithm once, after a small surface has warmed
-    up the libraries. Seconds are those of the clock, since CPU seconds would add the threads up.
-    Surfaces are named as in `limit`.
+    up the libraries. Surfaces are named as in `limit`.
     """
     orders = [one for one in ORDERS if one in available_backends()]
     rows = []
     for surface in progress(surfaces):
-        ways = list(product(orders, THREADS))
-        runs = [{way: in_fresh_process(measure, surface, way[0], algorithm, threads=way[1])
-                 for way in ways} for _ in range(rounds)]  # fmt: skip
-        rows += [row(surface, *way, [one[way] for one in runs]) for way in ways]
+        runs = [
+            {one: in_fresh_process(measure, surface, one, algorithm) for one in orders}
+            for _ in range(rounds)
+        ]
+        rows += [row(surface, order, [one[order] for one in runs]) for order in orders]
     how = f"Medians of {rounds} processes with one call of `{algorithm}`."
     return Section([Table(rows, LAYOUT), how], "docs/speed.md")
 
 
-def row(surface: str, backend: str, threads: int, runs: list[dict[str, Any]]) -> dict[str, Any]:
-    """Return the medians of a surface's processes with one order of rows and number of threads."""
+def row(surface: str, backend: str, runs: list[dict[str, Any]]) -> dict[str, Any]:
+    """Return the medians of a surface's processes with one order of rows."""
     return {
         "surface": "spherical cap" if surface.isdigit() else Path(surface).name,
         "order": ORDERS[backend],
-        "threads": threads,
         **runs[-1],
         **{key: median(run[key] for run in runs) for key in ("seconds", "factoring")},
     }

@@ -46,18 +46,14 @@ def read_surface(name: str) -> Any:
 
 
 def in_fresh_process(
-    function: Callable[..., Any],
-    *arguments: Any,
-    threads: int = 1,
-    without: Collection[str] = (),
+    function: Callable[..., Any], *arguments: Any, without: Collection[str] = ()
 ) -> Any:
     """Return what a study's function returns in a process of its own; all of it is JSON.
 
-    The numerical libraries have `threads` threads, and the environment is that of timed processes,
-    `without` some of its variables.
+    The environment is that of timed processes, `without` some of its variables.
     """
     arguments_of_process = [function.__module__, function.__qualname__, json.dumps(arguments)]
-    environment = {k: v for k, v in for_measuring(threads).items() if k not in without}
+    environment = {k: v for k, v in for_measuring(1).items() if k not in without}
     command = [sys.executable, "-m", "benchmarks.measuring", *arguments_of_process]
     run = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment)
     if run.returncode:

@@ -75,7 +75,7 @@ BUDGETS = {
     "core": 2_050,
     "mesh": 6_880,
     "linear_algebra": 1_550,
-    "conformal": 6_690,
+    "conformal": 6_790,
     "registry": 960,
     "results": 5_000,
     "running": 7_910,

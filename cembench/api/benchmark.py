@@ -456,7 +456,7 @@ def benchmark(
         The library that factors matrices (default: cvxopt if it is installed, else superlu).
         cvxopt-metis makes smaller factors of large meshes, in more time.
     threads : int
-        Threads of the numerical libraries.
+        Threads of the numerical libraries; OpenBLAS keeps one, as its sums depend on the number.
     reference : str, optional
         Show this algorithm's speedup over the others (default: cem).
     cluster : str, optional

@@ -151,7 +151,7 @@ def compare_versions(
     timeout : float
         Time limit of a call, in seconds.
     threads : int
-        Threads of the numerical libraries.
+        Threads of the numerical libraries; OpenBLAS keeps one, as its sums depend on the number.
     output : path, optional
         The run's folder. Default in Python: a new temporary folder.
     reporter : Reporter

@@ -406,8 +406,8 @@ def parameterize(
         :attr:`Result.mesh` is that. ``"cetm-flips"`` has it: the mesh cut along the edges of the
         flipped triangulation.
     threads : int
-        Threads of the numerical libraries. As everywhere in this package, one by default, whatever
-        the environment says: the last digits of a map depend on their number.
+        Threads of the numerical libraries. OpenBLAS always has one, whatever the environment says,
+        since its sums depend on their number: built-in algorithms have the same map with any.
     plugins : iterable of str
         Python files or ``module:name`` with more algorithms.
     **parameters

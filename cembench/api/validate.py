@@ -69,7 +69,7 @@ def validate(
     checks_only : bool
         Check contract and correctness only, without timing.
     threads : int
-        Threads of the numerical libraries, the baselines' too.
+        Threads of the numerical libraries, the baselines' too; OpenBLAS keeps one.
     timeout : float
         Time limit of a call, in seconds.
     output : path, optional

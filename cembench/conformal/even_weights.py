@@ -10,20 +10,13 @@ that of least-squares conformal maps (Levy et al. 2002), with weights.
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
-
 import numpy as np
 import scipy
 
-from cembench.conformal.laplacian import corner_products
 from cembench.conformal.metrics import angle_errors, flipped_triangles
 from cembench.core.arrays import Complex, Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
-from cembench.core.parameterization import Parameterization
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 
@@ -35,13 +28,6 @@ FLOOR = 0.1
 DAMPING = 1e-6
 #: A step is halved so often at most.
 HALVINGS = 6
-#: A mesh is graded if this share of its triangles has an angle below so many degrees, and the
-#: natural logarithms of the areas have this standard deviation; or if they have the larger one.
-NEEDLES, THIN, SPREAD, WIDE = 0.04, 5.0, 1.2, 1.5
-#: Then so many steps are taken.
-USUAL_STEPS = 2
-#: Every k-th triangle is looked at, these or a few more in all.
-SAMPLE = 4_000
 
 
 def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
@@ -106,44 +92,6 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
             return uv, taken
         uv, error = tried, new
     return uv, steps
-
-
-def with_even_steps(method: Callable[..., Parameterization]) -> Callable[..., Parameterization]:
-    """Let an algorithm for disks end in at most `even` steps of :func:`evened`, a parameter.
-
-    None takes :data:`USUAL_STEPS` if :func:`is_graded` holds, and no step on other meshes.
-    """
-
-    @functools.wraps(method)
-    def evenly(mesh: DiskMesh, **parameters: Any) -> Parameterization:
-        own = method(mesh, **parameters)
-        steps = parameters.get("even")
-        if steps is None:
-            steps = USUAL_STEPS if is_graded(mesh) else 0
-        if not steps:
-            return own
-        uv, taken = evened(mesh, own.uv, steps)
-        return replace(own, uv=uv, extras=own.extras | {"even_steps": taken})
-
-    return evenly
-
-
-def is_graded(mesh: DiskMesh) -> bool:
-    """Whether the areas of a mesh vary so much that E_C misses triangles; needles tell sooner.
-
-    Its least E_C may then have far larger angle errors than needed.
-
-    Examples
-    --------
-    >>> import cembench
-    >>> is_graded(cembench.surface("hemi-ellipsoid", 600))
-    False
-
-    """
-    dots, double_area = corner_products(mesh.V, mesh.F[:: max(1, mesh.m // SAMPLE)])
-    needles = dots.max(axis=1) * np.tan(np.deg2rad(THIN)) > double_area
-    least = SPREAD if needles.mean() > NEEDLES else WIDE
-    return bool(np.log(double_area).std() > least)
 
 
 def _gradients(mesh: DiskMesh) -> Complex:

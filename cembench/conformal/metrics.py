@@ -237,13 +237,13 @@ def area_distortion(areas: Real, images: Real) -> tuple[float, float]:
     """
     held = areas > 0
     areas, images = areas[held], images[held]
-    weights = areas / areas.sum()
     with np.errstate(divide="ignore", invalid="ignore"):
         off = np.log(np.abs(images)) - np.log(areas)
     if not np.isfinite(off).all():
         return float("inf"), float("inf")
-    off -= weights @ off
-    return float(weights @ np.abs(off)), float(np.sqrt(weights @ off**2))
+    off -= np.average(off, weights=areas)
+    mean, variance = (np.average(one, weights=areas) for one in (np.abs(off), off**2))
+    return float(mean), float(np.sqrt(variance))
 
 
 class MapFigures:
@@ -316,7 +316,7 @@ class MapFigures:
     @cached_property
     def beltrami_mean(self) -> float:
         """Mean of the modulus of mu over the surface's area."""
-        return float(self.areas @ self.beltrami / self.areas.sum())
+        return float(np.average(self.beltrami, weights=self.areas))
 
     @cached_property
     def is_disk_map(self) -> bool:

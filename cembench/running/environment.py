@@ -18,11 +18,12 @@ from cembench.core.version import installed_version, version_of
 #: Variables that set the number of threads; set them before numerical libraries are loaded.
 THREAD_VARIABLES = (
     "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
     "MKL_NUM_THREADS",
     "IGL_NUM_THREADS",
     "VECLIB_MAXIMUM_THREADS",
 )
+#: That of OpenBLAS: one thread, since its sums depend on the number, and so would maps.
+SUMS_VARIABLE = "OPENBLAS_NUM_THREADS"
 #: Settings of glibc's allocator, which it reads when a process starts; others ignore them.
 ALLOCATOR_VARIABLE = "GLIBC_TUNABLES"
 #: Memory comes in huge pages where Linux offers them on request, and what is freed stays with the
@@ -56,9 +57,9 @@ def importing() -> Iterator[None]:
 def for_measuring(threads: int) -> dict[str, str]:
     """Return the environment of processes whose calls are timed.
 
-    Numerical libraries use `threads` threads, and memory is handled as :data:`ALLOCATOR` says,
-    unless the user's own settings of the allocator say otherwise. A process that imports a plug-in
-    itself has the variables that this sets, but no other one has.
+    Numerical libraries use `threads` threads, OpenBLAS one, and memory is handled as
+    :data:`ALLOCATOR` says, unless the user's own settings of the allocator say otherwise. A process
+    that imports a plug-in itself has the variables that this sets, but no other one has.
 
     Examples
     --------
@@ -71,7 +72,8 @@ def for_measuring(threads: int) -> dict[str, str]:
     named = {one.partition("=")[0] for one in own}
     ours = [f"{name}={value}" for name, value in ALLOCATOR.items() if name not in named]
     allocator = {ALLOCATOR_VARIABLE: ":".join(own + ours)}
-    return given | dict.fromkeys(THREAD_VARIABLES, str(threads)) | allocator
+    counts = dict.fromkeys(THREAD_VARIABLES, str(threads)) | {SUMS_VARIABLE: "1"}
+    return given | counts | allocator
 
 
 def usable_cores() -> int:

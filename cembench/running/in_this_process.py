@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import psutil
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Record
@@ -43,10 +43,14 @@ def may_run_here(task: Task) -> bool:
 
 @contextmanager
 def numerical_threads(count: int) -> Iterator[None]:
-    """Let the numerical libraries use so many threads: sums, and so maps, depend on the number."""
+    """Let the numerical libraries use so many threads, and OpenBLAS one, as where calls are timed.
+
+    Its sums, and so maps, would depend on the number.
+    """
     for name in _CALLED:  # one that is loaded later has its own number
         importlib.import_module(name)
-    with threadpool_limits(limits=count):
+    found = ThreadpoolController()
+    with found.limit(limits=count), found.select(internal_api="openblas").limit(limits=1):
         yield
 
 

@@ -23,6 +23,23 @@ def task_of(spec, faces=500, **settings):
     return plan_cells([spec], [hemi_ellipsoid(faces)], {}, how)[0]
 
 
+NAMES = [a.name for a in load_registry().algorithms.values() if a.target == "disk"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_map_and_its_figures_do_not_depend_on_the_number_of_threads(name):
+    mesh = hemi_ellipsoid(2_000)
+    one, two = (cembench.parameterize(mesh, name, threads=count) for count in (1, 2))
+    np.testing.assert_array_equal(one.z, two.z)
+    assert one.metrics == two.metrics
+
+
+def test_a_map_does_not_depend_on_the_threads_of_its_process():
+    uv = [map_once(task_of(load_registry().algorithm("direct-cem"), 2_000, threads=k))[1]
+          for k in (1, 2)]  # fmt: skip
+    np.testing.assert_array_equal(*uv)
+
+
 def parameterized(task):
     """The same call by the Python API."""
     return cembench.parameterize(task.mesh, "harmonic-circle")
