@@ -33,6 +33,8 @@ MOST_PIECES = 50
 COMPARABLE = 0.95
 #: What is mapped anew.
 ISLANDS, WHOLE = "the same islands", "the surface without seams"
+#: Overlaps of this share of the image are of rounding, or of single folds.
+ROUNDING = 1e-6
 #: Where images overlap.
 OVERLAPS = {
     "overlap_inside_islands": "inside islands",
@@ -189,7 +191,7 @@ def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
 def _overlap(share: float | None, where: str) -> str:
     if share is None:
         return f"overlaps {where} cannot be told"
-    return f"{100 * share:.2g} % of the image overlaps {where}" if share else ""
+    return f"{100 * share:.2g} % of the image overlaps {where}" if share > ROUNDING else ""
 
 
 def _coverage(m: Mapping[str, float | int | None], islands: int) -> str:

@@ -65,6 +65,8 @@ def test_arrays_a_file_a_pair_and_objects_give_the_same(mapped, tmp_path):
     V, F, uv = mapped.mesh.V, mapped.mesh.F, mapped.uv
     cembench.write_mesh(tmp_path / "a.obj", mapped.mesh, uv)
     cembench.write_mesh(tmp_path / "a.npz", mapped.mesh, uv)
+    np.savez(tmp_path / "corners.npz", V=V, F=F, uv=uv[F])
+    np.savez(tmp_path / "complex.npz", V=V, F=F, uv=mapped.z[F])
     textured = pyvista.make_tri_mesh(V, F)
     textured.active_texture_coordinates = uv
     plain = cembench.measure(V, F, uv).metrics
@@ -74,6 +76,8 @@ def test_arrays_a_file_a_pair_and_objects_give_the_same(mapped, tmp_path):
         cembench.measure(mapped.mesh, mapped.z),
         cembench.measure(tmp_path / "a.obj"),
         cembench.measure(tmp_path / "a.npz"),
+        cembench.measure(tmp_path / "corners.npz"),
+        cembench.measure(tmp_path / "complex.npz"),
         cembench.measure({"V": V, "F": F, "uv": uv}),
         cembench.measure(trimesh.Trimesh(V, F, visual=visual, process=False)),
         cembench.measure(textured),
