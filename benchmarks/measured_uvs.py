@@ -6,6 +6,7 @@ Of the public surfaces that are fetched (`cembench fetch --group all`), those wh
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import inf
 from statistics import median
 from typing import Any
 
@@ -19,9 +20,9 @@ from cembench.mesh.datasets import is_fetched
 from cembench.registry import load_registry
 
 LAYOUT = """
-| surface | islands | folds | overlap | angle error, as made | same islands | one chart | density, as made | same islands | one chart |
+| model | islands | folds | overlap | angle error made | islands anew | one chart | density made | islands anew | one chart |
 |---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
-| {name} | {islands:,} | {folds:,} | {overlap} | {made:.2f} | {again:.2f} | {chart:.2f} | {made_density} | {again_density} | {chart_density} |"""  # noqa: E501
+| {name} | {islands:,} | {folds:,} | {overlap} | {made:.2f} | {again:.2f} | {chart:.2f} | {uneven_made} | {uneven_again} | {uneven_chart} |"""  # noqa: E501
 #: Mean angle error in degrees below which UVs are those of a flat surface, which say nothing here.
 FLAT = 1e-3
 
@@ -30,8 +31,11 @@ def measured_uvs() -> Section:
     """Measure the UVs of public models, of the same islands mapped anew, and of one chart."""
     fetched = [one for one in load_registry().datasets.values() if is_fetched(one)]
     rows = [row for one in progress(fetched) if (row := _row(one.name, one.path)) is not None]
-    rows.sort(key=lambda row: row["name"])
-    return Section([_words(rows, len(fetched)), Table(rows, LAYOUT)], "docs/measure.md")
+    whole = [row for row in rows if None not in (row["again"], row["chart"])]
+    if not whole:
+        raise SystemExit("no fetched surface has UVs: cembench fetch --group corpus fetches some.")
+    whole.sort(key=lambda row: row["name"])
+    return Section([_words(whole, len(rows)), Table(whole, LAYOUT)], "docs/measure.md")
 
 
 def _row(name: str, path: Any) -> dict[str, Any] | None:
@@ -46,6 +50,11 @@ def _row(name: str, path: Any) -> dict[str, Any] | None:
     m = found.metrics
     inside, between = m["overlap_inside_islands"], m["overlap_between_islands"]
     overlap = None if inside is None or between is None else inside + between
+    density = {
+        "made": m["texel_density_ratio"],
+        "again": again and again.texel_density_ratio,
+        "chart": chart and chart.texel_density_ratio,
+    }
     return {
         "name": name,
         "islands": m["islands"],
@@ -54,9 +63,8 @@ def _row(name: str, path: Any) -> dict[str, Any] | None:
         "made": m["angle_error_mean_deg"],
         "again": again and again.angle_error_mean_deg,
         "chart": chart and chart.angle_error_mean_deg,
-        "made_density": _density(m["texel_density_ratio"]),
-        "again_density": again and _density(again.texel_density_ratio),
-        "chart_density": chart and _density(chart.texel_density_ratio),
+        "density": {which: ratio or inf for which, ratio in density.items()},
+        **{f"uneven_{which}": density_words(ratio or inf) for which, ratio in density.items()},
     }
 
 
@@ -66,22 +74,18 @@ def _whole(best: Mapping[str, Best], which: str) -> Best | None:
     return one if one is not None and one.share >= COMPARABLE else None
 
 
-def _density(ratio: float | None) -> str:
-    return "no bound" if ratio is None else density_words(ratio)
-
-
-def _words(rows: list[dict[str, Any]], fetched: int) -> str:
-    both = [row for row in rows if None not in (row["again"], row["chart"])]
-    if not both:
-        raise SystemExit("no fetched surface has UVs: cembench fetch --group corpus fetches some.")
-    made, again, chart = (median(row[name] for row in both) for name in ("made", "again", "chart"))
-    folded = sum(row["folds"] > 0 for row in rows)
-    better = sum(row["chart"] < row["made"] for row in both)
+def _words(rows: list[dict[str, Any]], all_with_uvs: int) -> str:
+    made, again, chart = (median(row[name] for row in rows) for name in ("made", "again", "chart"))
+    uneven_made, uneven_chart = (
+        density_words(median(row["density"][name] for row in rows)) for name in ("made", "chart")
+    )
+    better = sum(row["chart"] < row["made"] for row in rows)
     return (
-        f"**One conformal chart without seams has smaller angle errors than the UVs that "
-        f"{better} of {len(both)} public models come with** (medians {chart:.2f} and {made:.2f} "
-        f"degrees; the same islands mapped anew have {again:.2f}). What their seams buy is an even "
-        f"texel density. {folded} of {len(rows)} have folds. These are the models among {fetched} "
-        "fetched surfaces whose files hold UVs and that are not flat; density is the largest over "
-        "the smallest, without a hundredth at either end; a dash: less than 95 % could be mapped."
+        f"**The UVs of {better} of {len(rows)} public models have larger angle errors than one "
+        f"conformal chart without their seams** (medians {made:.2f} and {chart:.2f} degrees; the "
+        f"same islands mapped anew have {again:.2f}). What the seams buy is an even texel density: "
+        f"its largest over its smallest has the median {uneven_made}, in one chart {uneven_chart}. "
+        f"{sum(row['folds'] > 0 for row in rows)} of {len(rows)} have folds. Of {all_with_uvs} "
+        "public surfaces with UVs that are not flat, these are the ones of which at least 95 % "
+        "could be mapped both ways."
     )
