@@ -246,7 +246,7 @@ def test_uvs_of_a_mesh_without_a_material_are_read(tmp_path, suffix):
     other = trimesh.visual.TextureVisuals(uv=uv, material=trimesh.visual.material.PBRMaterial())
     scene = trimesh.Scene(
         [
-            trimesh.Trimesh(V + [0, 0, 9 * k], F, visual=one, process=False)
+            trimesh.Trimesh(V + np.array([0, 0, 9 * k]), F, visual=one, process=False)
             for k, one in enumerate((plain, other))
         ]
     )

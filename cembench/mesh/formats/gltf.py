@@ -80,7 +80,7 @@ def _scene(path: Path) -> Any:
         rest = content[end:]
         sizes = struct.pack("<III", start + len(text) + len(rest), len(text), 0x4E4F534A)
         text = _GLB + sizes + text + rest
-    resolver = trimesh.resolvers.FilePathResolver(path)
+    resolver = trimesh.resolvers.FilePathResolver(str(path))
     kind = path.suffix[1:].lower()
     return trimesh.load_scene(io.BytesIO(text), file_type=kind, resolver=resolver, process=False)
 
