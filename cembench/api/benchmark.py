@@ -326,7 +326,7 @@ def benchmark(
         Python files or ``module:name`` with more algorithms.
     maps : mapping, optional
         Maps that somebody made, as another column: the folder of each name, with one file a
-        surface, which is recognised by its mesh (docs/compare.md). They have no seconds.
+        surface, which is recognised by its mesh (docs/measure.md). They have no seconds.
         NAME:disk, or another target, says what they are; else their boundaries do.
     precision : float or str, optional
         Measure until the half-width of the 95 % intervals, of the seconds and of their ratios to

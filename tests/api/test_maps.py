@@ -8,8 +8,7 @@ from cembench.core.errors import ParameterError
 from cembench.report.content.evidence import Evidence
 from cembench.report.content.standings import contest_of, standings
 from cembench.report.declared_plots import declared_plot
-from cembench.report.run_tables import results_table
-from cembench.results.columns import marks_explained
+from cembench.results.columns import COLUMNS, marks_explained
 from cembench.results.store import Store
 
 
@@ -53,7 +52,7 @@ def test_a_folder_of_maps_is_a_column(tmp_path, surfaces):
     profile = declared_plot(evidence, "performance-profile")
     assert profile is not None
     assert not any("theirs" in one.name for panel in profile.panels for one in panel.series)
-    assert any("the map was read from a file" in note for note in results_table(evidence).notes)
+    assert COLUMNS["seconds"].why_lacking(theirs[0]) == "the map was read from a file"
     assert marks_explained(theirs)[0].startswith("§ maps that somebody made")
 
     again = run(surfaces, folder, tmp_path / "run", **rounds)
