@@ -127,7 +127,7 @@ def of_vertices(corners: Complex, mesh: TriangleMesh) -> Complex:
     if len(apart):
         message = (
             f"{len(apart)} vertices have several UVs, the first being {apart[0]}: the surface was "
-            'cut. Such a map has the target "atlas"'
+            'cut. Declare the target "atlas" for such maps'
         )
         raise ProgramFault(FaultKind.CUT_SURFACE, message, status="invalid")
     return uv
