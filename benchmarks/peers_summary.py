@@ -8,12 +8,11 @@ import pandas as pd
 from cembench.sharing.leaderboard import UNSEEN
 
 from benchmarks.pages import ROOT, Section, Table
-from cembench.results.columns import LIBRARY_MARK, PROGRAM_MARK
+from cembench.results.columns import MARKS
 from cembench.results.report_records import text_rows
 
 #: The kept report, and the algorithm of ours that the others are compared with, by target.
 KEPT, BESIDE = ROOT / "reports/peers", {"disk": "direct-cem", "free boundary": "lscm"}
-MARKS = {"program": PROGRAM_MARK, "library": LIBRARY_MARK}
 FIGURES = ["angle", "seconds"]
 
 
@@ -51,7 +50,7 @@ def peers_summary(*, report: Path = KEPT) -> Section:
     words = (
         "Medians over the disks of which both have a valid map. Ours is Direct CEM for maps to the "
         f"disk, LSCM for a free boundary. Angle errors below {UNSEEN} degrees count as {UNSEEN}. "
-        f"{PROGRAM_MARK} program: its solve time counts, not its start; {LIBRARY_MARK} library, "
-        "called in the process."
+        f"{MARKS['program']} program: its solve time counts, not its start; "
+        f"{MARKS['library']} library, called in the process."
     )
     return Section([words, Table(rows, layout)], "reports/peers/report.md")

@@ -36,6 +36,7 @@ from cembench.core.names import did_you_mean, unknown
 from cembench.core.parameterization import MapStep
 from cembench.core.program import (
     Library,
+    MapFiles,
     Program,
     checked_program,
     found_words,
@@ -156,6 +157,8 @@ class Algorithm(_Registered):
     program: Program | None = None
     #: The third-party library that its function calls, if any.
     library: Library | None = None
+    #: The files that hold its maps, if somebody made them; the function is then never called.
+    maps: MapFiles | None = None
     #: Whether its map depends on the triangles alone, not on the coordinates.
     combinatorial: bool = False
 
@@ -360,6 +363,16 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
     about = {"target": target or "disk", "source": source, "notes": ""}
     function = _TAKES.get(target, _of_disks)
     return _program_of(function, place, name, name, about, command, folder, settings)
+
+
+def maps_from(declared: Mapping[str, Any]) -> Algorithm:
+    """Return the algorithm whose maps are files: `name`, `target`, and those of `MapFiles`."""
+    settings = dict(declared)
+    name, target = settings.pop("name"), settings.pop("target")
+    about = {"target": target, "source": settings["folder"], "notes": ""}
+    function = _of_disks if target == "disk" else _TAKES.get(target, _of_any)
+    spec = _algorithm_of(function, ("cembench.registry", None), name, f"{name} (files)", about)
+    return replace(spec, maps=MapFiles(**settings))
 
 
 def _of_disks(mesh: DiskMesh) -> None:
@@ -663,6 +676,8 @@ _GROUPS: Mapping[type, str] = {
 PEERS = "cembench.peers"
 #: Prefix of a plug-in that is a command line; its declaration follows as JSON.
 COMMAND = "command:"
+#: Prefix of a plug-in that is a folder of maps, likewise.
+MAPS = "maps:"
 
 
 def _look_up(kind: str, known: Mapping[str, R], name: str) -> R:
@@ -849,6 +864,8 @@ def declared_by(plugin: str) -> list[_Registered]:
     if plugin.startswith(COMMAND):
         declared = json.loads(plugin.removeprefix(COMMAND))
         return [program_from(declared, Path(declared.pop("folder", "")))]
+    if plugin.startswith(MAPS):
+        return [maps_from(json.loads(plugin.removeprefix(MAPS)))]
     location, _, name = plugin.partition(":")
     path = Path(plugin)
     if path.suffix == ".py":

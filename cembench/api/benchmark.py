@@ -364,6 +364,7 @@ def benchmark(
     repair: bool = False,
     parameters: Mapping[str, Any] | None = None,
     plugins: Sequence[str] = (),
+    maps: Mapping[str, AnyPath] | None = None,
     precision: float | str | None = None,
     rounds: Rounds | None = None,
     max_rounds: Annotated[int, Range(LOOKS[1], LOOKS[-1])] = USUAL_MOST_ROUNDS,
@@ -424,6 +425,10 @@ def benchmark(
         for one.
     plugins : sequence of str
         Python files or ``module:name`` with more algorithms.
+    maps : mapping, optional
+        Maps that somebody made, as another column: the folder of each name, with one file a
+        surface, which is recognised by its mesh (docs/measure.md). They have no seconds.
+        NAME:disk, or another target, says what they are; else their boundaries do.
     precision : float or str, optional
         Measure until the half-width of the 95 % intervals, of the seconds and of their ratios to
         the reference, is at most this share, e.g. 5% or 0.05 (default: 5%).
@@ -546,6 +551,7 @@ def benchmark(
         output,
         parameters=parameters,
         plugins=plugins,
+        maps=maps,
         paper=paper,
         part=part,
         reference=reference,
@@ -570,6 +576,7 @@ _EXCLUDING = (
     ("rounds", "precision", "sets the number that `precision` chooses: give only one of them"),
     ("rounds", "budget", "sets a number that `budget` does not shorten: give only one of them"),
     ("rounds", "max_rounds", "sets the number that `max_rounds` limits: give only one of them"),
+    ("maps", "cluster", "are read on this machine: leave `cluster` out, and `merge` both runs"),
     ("repair", "sets", "is for single files and folders, not for `sets`: leave it out"),
 )
 #: Arguments that need another one.

@@ -33,6 +33,8 @@ MOST_PIECES = 50
 COMPARABLE = 0.95
 #: What is mapped anew.
 ISLANDS, WHOLE = "the same islands", "the surface without seams"
+#: Overlaps of this share of the image are of rounding, or of single folds.
+ROUNDING = 1e-6
 #: Where images overlap.
 OVERLAPS = {
     "overlap_inside_islands": "inside islands",
@@ -189,7 +191,20 @@ def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
 def _overlap(share: float | None, where: str) -> str:
     if share is None:
         return f"overlaps {where} cannot be told"
-    return f"{100 * share:.2g} % of the image overlaps {where}" if share else ""
+    return f"{100 * share:.2g} % of the image overlaps {where}" if share > ROUNDING else ""
+
+
+def _coverage(m: Mapping[str, float | int | None], islands: int) -> str:
+    """Return how much of the texture is used; where it repeats, a share would say nothing."""
+    if beyond := m["islands_beyond_their_tile"]:
+        return (
+            f"{beyond} of {counted(islands, 'island')} beyond one tile, where the texture repeats"
+        )
+    if m["covered_share"] is None:
+        return ""
+    tiles = m["tiles"] or 1
+    square = "the square" if tiles == 1 else f"{tiles} tiles"
+    return f"{100 * m['covered_share']:.0f} % of {square} covered"
 
 
 def _sentence(found: Measurement) -> str:
@@ -201,7 +216,7 @@ def _sentence(found: Measurement) -> str:
         counted(int(folds), "fold") if (folds := m["flipped_triangles"]) else "no folds",
         *(_overlap(m[name], where) for name, where in OVERLAPS.items()),
         texture_words(m),
-        f"{100 * (m['covered_share'] or 0):.0f} % of the square covered",
+        _coverage(m, found.cut.islands),
     ]
     return ", ".join(filter(None, parts)) + "."
 

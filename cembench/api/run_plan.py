@@ -27,6 +27,7 @@ from cembench.results.store import Store
 from cembench.running.environment import usable_cores
 from cembench.running.estimate import Estimate, estimate, planned_seconds
 from cembench.running.external.installed import missing
+from cembench.running.given_maps import given_maps
 from cembench.running.local import run_tasks
 from cembench.running.options import Options
 from cembench.running.plan import (
@@ -116,7 +117,7 @@ class Plan:
         records, held, lacking = self._records(), self.held(), self.lacking()
         return [
             None
-            if t.cell.key in held or t.algorithm.name in lacking
+            if t.cell.key in held or t.algorithm.name in lacking or t.algorithm.maps is not None
             else estimate(t.cell, t.facts.faces, records)
             for t in self.tasks
         ]
@@ -175,6 +176,7 @@ def plan(
     *,
     parameters: Mapping[str, Any] | None = None,
     plugins: Sequence[str] = (),
+    maps: Mapping[str, AnyPath] | None = None,
     paper: str | None = None,
     part: str | None = None,
     reference: str | None = None,
@@ -196,6 +198,12 @@ def plan(
         if why := missing(algorithm):
             reporter.note(f"{algorithm.name} is not available: {why}.")
     meshes, roles, exhibit = _gathered(sources, registry, chosen, reporter)
+    for called, folder in (maps or {}).items():
+        taken = {*registry.algorithms, *registry.peers, *(one.name for one in chosen)}
+        one, plugin = given_maps(called, Path(folder), meshes, reporter)
+        if one.name in taken:
+            raise ParameterError(f"maps={called}: an algorithm has this name; choose another.")
+        chosen, plugins = [*chosen, one], [*plugins, plugin]
     tasks = []
     for how in hows:
         tasks += plan_cells(chosen, meshes, parameters or {}, how, plugins, roles, asked)

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
     epilog="Examples:  cembench run --profile quick --dry-run  ·  "
     "cembench run --mesh a.obj -a cem,lscm --solves reuse,backslash  ·  "
     "cembench run --surfaces spherical-cap -o results/cap --json  ·  "
-    "cembench run --set real-disks -a all --limit 20"
+    "cembench run --set real-disks -a all --limit 20  ·  "
+    "cembench run --mesh-dir meshes -a lscm,cem --maps theirs=their_uvs"
 )
 @from_api(
     benchmark,
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     limit="--limit N",
     precision="--precision SHARE",
     budget="--budget TIME",
+    maps="--maps NAME=FOLDER",
     solves="--solves NAME",
     cluster="--cluster PLACE",
     part="--part K/N",
@@ -132,4 +134,6 @@ def _print_plan(plan: Plan, *, as_json: bool) -> None:
 
 def _not_run(cell: Mapping[str, str | None]) -> str:
     """Return why a cell of a plan has no cost."""
-    return f"recorded: {cell['held']}" if cell["held"] else "cannot run here"
+    if cell["held"]:
+        return f"recorded: {cell['held']}"
+    return "cannot run here" if cell["lacks"] else "a map from a file"

@@ -102,7 +102,8 @@ def _angles(V: Real, F: NDArray[np.int64]) -> Real:
 
 
 def _in_degrees(dots: Real, double_area: Real) -> Real:
-    return np.asarray(np.rad2deg(np.arctan2(double_area[:, None], dots)))
+    # Of a triangle that has collapsed to a point, products are 0 or -0, whose angle would be 180.
+    return np.asarray(np.rad2deg(np.arctan2(double_area[:, None], dots + 0.0)))
 
 
 def angle_errors(mesh: TriangleMesh, uv: Complex) -> Real:

@@ -190,6 +190,8 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
     """
     import shapely
 
+    if not len(starts):
+        return 0.0, 0.0
     sides = shapely.linestrings(
         np.stack([starts.real, ends.real], axis=1), np.stack([starts.imag, ends.imag], axis=1)
     )

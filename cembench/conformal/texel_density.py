@@ -115,13 +115,13 @@ _NAMED = ((1e12, "trillion"), (1e9, "billion"), (1e6, "million"))
 def density_words(ratio: float) -> str:
     """Return a ratio of densities as people write it.
 
-    >>> density_words(2.26), density_words(1538.2), density_words(6.8e7)
-    ('2.3 : 1', '1,538 : 1', '68 million : 1')
+    >>> density_words(2.26), density_words(1538.2), density_words(3.47e8)
+    ('2.3 : 1', '1,538 : 1', '347 million : 1')
     """
-    for size, name in _NAMED:
-        if ratio >= size:
-            return f"{ratio / size:.2g} {name} : 1" if ratio < 1e15 else "unbounded"
-    return f"{ratio:,.0f} : 1" if ratio >= 10 else f"{ratio:.2g} : 1"
+    if ratio >= 1e15:
+        return "unbounded"
+    size, name = next(((size, f" {name}") for size, name in _NAMED if ratio >= size), (1.0, ""))
+    return f"{ratio / size:{',.0f' if ratio >= 10 * size else '.2g'}}{name} : 1"
 
 
 def needs_islands(metrics: Mapping[str, float | int | None]) -> bool:

@@ -15,7 +15,7 @@ import numpy as np
 
 from cembench.conformal.atlas import AtlasFigures, CutMap
 from cembench.conformal.metrics import METRICS, MapFigures, Metric
-from cembench.conformal.planar import layered_areas
+from cembench.conformal.planar import layered_areas, signed_areas
 from cembench.conformal.texel_density import undersampled_share
 from cembench.core.arrays import Complex, Indices, Real
 
@@ -155,7 +155,7 @@ UV_METRICS: tuple[Metric, ...] = (
         ),
     ),
     Metric(
-        "tiles", "tiles (UDIM)", "", "", ".0f", ".0f", "unit squares that hold an island",
+        "tiles", "tiles", "", "", ".0f", ".0f", "unit squares that hold an island (UDIM)",
         lambda f: len(np.unique(_uv(f).tiles)), better=None,
     ),
     Metric(
@@ -191,25 +191,42 @@ def by_island(figures: UvFigures) -> list[dict[str, Any]]:
         "texel_density": np.sqrt(images / areas / (figures.whole / areas.sum())),
         "overlap": figures.layers[0] / images,
         "mirrored": cut.turned,
-        "tile": (1001 + tile.real + 10 * tile.imag).astype(np.int64),
+        "tile": [_udim(int(one.real), int(one.imag)) for one in tile],
     }
     columns = [np.asarray(values).tolist() for values in each.values()]
     return [dict(zip(each, row, strict=True)) for row in zip(*columns, strict=True)]
 
 
+def _udim(u: int, v: int) -> int | None:
+    """Return the number of a tile; None for one that has none."""
+    return 1001 + u + 10 * v if 0 <= u < 10 and v >= 0 else None
+
+
 def _outlines(cut: CutMap) -> tuple[Complex, Complex, Indices]:
     """Return the sides that bound islands, from where to where, the islands to their left.
 
-    They are sorted by island; the third array has where each but the first one begins.
+    Of an island, triangles that keep their orientation and those that do not are apart: where it is
+    folded, it lies over itself. The sides are sorted by island; the third array has where each but
+    the first one begins.
     """
     F, n = cut.surface.F, cut.surface.n
+    back = signed_areas(cut.given, F) < 0
+    F = np.where(back[:, None], F[:, ::-1], F)
     tail, head = F.ravel(), np.roll(F, -1, axis=1).ravel()
-    bound = np.flatnonzero(~np.isin(tail * n + head, head * n + tail))
-    bound = bound[np.argsort(cut.island[bound // 3], kind="stable")]
-    owner = cut.island[bound // 3]
-    sides = np.stack([tail[bound], head[bound]], axis=1)
-    sides = np.where(cut.turned[owner, None], sides[:, ::-1], sides)
-    return *cut.given[sides.T], np.searchsorted(owner, np.arange(1, cut.islands))
+    piece, side = np.repeat(2 * cut.island + back, 3), np.minimum(tail, head) * n + abs(tail - head)
+    order = np.lexsort((side, piece))
+    piece, side = piece[order], side[order]
+    first = np.append(True, (piece[1:] != piece[:-1]) | (side[1:] != side[:-1]))
+    first = np.flatnonzero(first)
+    # What is left of sides that are gone along both ways.
+    left = np.add.reduceat(np.where(tail < head, 1, -1)[order], first)
+    kept = np.repeat(first, np.abs(left))
+    low, away = np.divmod(side[kept], n)
+    ends = cut.given[np.stack([low, low + away])]
+    ends = np.where(np.repeat(left, np.abs(left)) > 0, ends, ends[::-1])
+    long = ends[0] != ends[1]
+    owner = piece[kept][long] // 2
+    return *ends[:, long], np.searchsorted(owner, np.arange(1, cut.islands))
 
 
 def worst_places(figures: AtlasFigures) -> tuple[Place, ...]:

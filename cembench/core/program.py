@@ -34,6 +34,18 @@ class Library:
 
 
 @dataclass(frozen=True)
+class MapFiles:
+    """Files with maps that somebody made, one a surface; they have no seconds."""
+
+    #: The folder, as it was named.
+    folder: str
+    #: The file of each surface, by the hash of its mesh.
+    files: Mapping[str, str]
+    #: As :attr:`Program.circle`, for files that hold few digits.
+    circle: float = 1e-5
+
+
+@dataclass(frozen=True)
 class Program:
     """A program that maps a mesh file to a file with UVs.
 

@@ -29,32 +29,25 @@ from cembench.results.multiple_testing import corrected
 from cembench.results.records import REFERENCE, LinearAlgebraWork, Record
 
 #: Marks of algorithms that are not cembench's code, in tables.
-PROGRAM_MARK, LIBRARY_MARK = "†", "‡"
+MARKS: Mapping[str, str] = {"program": "†", "library": "‡", "maps": "§"}
+_OTHERS = {
+    "program": "external program: its seconds are the wall clock of a process, with its start and "
+    "its files; comparisons take its solve time, and a verdict needs the wall clock less its start "
+    "to agree with the time that it prints",
+    "library": "a library of others, called in the process: it solves its systems in its own way",
+    "maps": "maps that somebody made, read from files: they have no seconds, memory or iterations",
+}
 
 
 def mark_of(record: Record) -> str:
     """Return the mark of an algorithm in a table; "" for cembench's own and plug-ins."""
-    if record.external is None:
-        return ""
-    return PROGRAM_MARK if record.external.kind == "program" else LIBRARY_MARK
+    return "" if record.external is None else MARKS[record.external.kind]
 
 
 def marks_explained(records: list[Record]) -> list[str]:
     """Return one line for each mark used in a table of these records."""
-    marks = {mark_of(record) for record in records}
-    lines = []
-    if PROGRAM_MARK in marks:
-        lines.append(
-            f"{PROGRAM_MARK} external program: its seconds are the wall clock of a process, with "
-            "its start and its files; comparisons take its solve time, and a verdict needs the "
-            "wall clock less its start to agree with the time that it prints"
-        )
-    if LIBRARY_MARK in marks:
-        lines.append(
-            f"{LIBRARY_MARK} a library of others, called in the process: it solves its systems "
-            "in its own way"
-        )
-    return lines
+    kinds = {record.external.kind for record in records if record.external is not None}
+    return [f"{MARKS[kind]} {words}" for kind, words in _OTHERS.items() if kind in kinds]
 
 
 def solve_words(record: Record) -> str:
@@ -207,6 +200,10 @@ def _without(name: str) -> str | Callable[[Record], str]:
     )
 
 
+def _unmeasured(record: Record) -> str:
+    return "the map was read from a file" if record.is_given else "not measured"
+
+
 def _uncounted(record: Record) -> str:
     return "the library does not report it" if counted(record) else "not counted"
 
@@ -283,8 +280,14 @@ EXPORTED = (
         form=",.0f", lacking="not counted by the algorithm",
     ),
     _C("boundaries", lambda r: [b.model_dump() for b in r.outcome.boundaries]),
-    _C("iterations", _at("outcome.iterations"), "iterations", form="d"),
-    _C("seconds", _at("outcome.median_seconds"), "seconds", timed=True, **_SECONDS),
+    _C(
+        "iterations", _at("outcome.iterations"), "iterations",
+        form="d", lacking=_unmeasured,
+    ),
+    _C(
+        "seconds", _at("outcome.median_seconds"), "seconds",
+        lacking=_unmeasured, timed=True, **_SECONDS,
+    ),
     _C("seconds_raw", lambda r: list(r.outcome.seconds)),
     _C(
         "seconds_together", lambda r: [x.together_seconds for x in r.outcome.rounds if x.together]
@@ -344,7 +347,7 @@ DERIVED = (
     _C("relative_energy", _at("outcome.relative_energy"), "E_C / A", form=".4f"),
     _C("comparable_energy", comparable_energy, "E_C", form=_ENERGY.form),
     _C("half_width", half_width, "±%", form=".0f", lacking="fewer than six rounds"),
-    _C("memory_mib", _memory, "memory", "MiB", ",.0f"),
+    _C("memory_mib", _memory, "memory", "MiB", ",.0f", _unmeasured),
     _C(
         "call_seconds", lambda r: None if r.is_program else r.outcome.median_seconds, "call",
         lacking="an external program is a process, not a call", **_SECONDS,

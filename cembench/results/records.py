@@ -333,9 +333,10 @@ class External(BaseModel):
 
     model_config = ConfigDict(frozen=True)
 
-    #: The seconds of a program are the wall clock of a process, those of a library of a call.
-    kind: Literal["program", "library"]
-    #: The command with its placeholders in braces, or the library's name.
+    #: The seconds of a program are the wall clock of a process, those of a library of a call; maps
+    #: that were read from files have none.
+    kind: Literal["program", "library", "maps"]
+    #: The command with its placeholders in braces, the library's name, or the folder of the maps.
     name: Printable
 
 
@@ -509,6 +510,11 @@ class Record(BaseModel):
     def is_program(self) -> bool:
         """Whether the seconds are the wall clock of an external program's process."""
         return self.external is not None and self.external.kind == "program"
+
+    @property
+    def is_given(self) -> bool:
+        """Whether its map was read from a file, so that it has no seconds."""
+        return self.external is not None and self.external.kind == "maps"
 
 
 class Environment(BaseModel):

@@ -206,7 +206,7 @@ class _Run:
         self._resume_after_check(state)
 
     def _resume_after_check(self, state: CellState) -> None:
-        if state.passed.status != "ok":
+        if state.passed.status != "ok" or not state.is_timed:
             self._save(state, state.passed.model_copy(update={"rounds": ()}))
         else:
             self._save_if_complete(state)

@@ -56,7 +56,7 @@ class Promise(BaseModel):
     @classmethod
     def of(cls, algorithm: Algorithm) -> Promise:
         """Return the promise of this algorithm."""
-        others = algorithm.program or algorithm.library
+        others = algorithm.program or algorithm.library or algorithm.maps
         return cls(
             target=algorithm.target,
             circle=CIRCLE_TOLERANCE if others is None else others.circle,

@@ -16,6 +16,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from time import monotonic, thread_time
 from typing import Any
@@ -41,6 +42,7 @@ from cembench.results.records import (
     not_ok,
 )
 from cembench.running.external.call import ProgramCalls
+from cembench.running.external.exchange import read_map
 from cembench.running.external.installed import library_version, missing
 from cembench.running.map_checks import SECOND_CALL, WARM_UP, judged_check
 from cembench.running.map_promises import Promise
@@ -289,7 +291,8 @@ def _called(
             program = _about_program(call)
         else:
             with linear_algebra(cell.solves, cell.backend), counting() as work:
-                ours = cell.algorithm not in RELAYS  # else the memory is of another process
+                # Else the memory is of another process, or what reading a file takes.
+                ours = cell.algorithm not in RELAYS and algorithm.maps is None
                 measured = memory_of_call if memory and ours else _without_memory
                 (returned, timing), used = measured(
                     lambda: _without_collector(lambda: call(mesh.fresh()))
@@ -298,6 +301,8 @@ def _called(
         return outcome_of_error(error, mesh), None
     if algorithm.library is not None:
         program = {"program": ProgramRun(version=library_version(algorithm.library))}
+    if algorithm.maps is not None:
+        program, work = {"iterations": None}, None
     uv = finite(returned.uv, algorithm.target)
     if isinstance(uv, Fault):
         return _with_memory(not_ok("invalid", uv).model_copy(update=program), used), None
@@ -310,7 +315,7 @@ def _called(
         program["work"] = LinearAlgebraWork(**asdict(work))
     start = program.pop("start", None)
     described = report | program | {"uv_hash": hash_of(uv)}
-    if seconds is None:
+    if seconds is None and algorithm.maps is None:
         described["rounds"] = (_program_round(_round([timing]), call, 1, start),)
     return _with_memory(outcome.model_copy(update=described), used), uv
 
@@ -474,12 +479,13 @@ def _call(algorithm: Algorithm, mesh: TriangleMesh, cell: Cell) -> Call:
     if algorithm.program is not None:
         return ProgramCalls(algorithm, mesh, arguments, cell.threads)
     lacking = missing(algorithm)
+    function = algorithm.function if algorithm.maps is None else partial(read_map, algorithm)
 
     def call(surface: TriangleMesh) -> tuple[Returned, Timing]:
         if lacking:
             raise NotThere(lacking)
         return measure(
-            lambda: Returned.of(algorithm.function(surface, **arguments), surface, algorithm.target)
+            lambda: Returned.of(function(surface, **arguments), surface, algorithm.target)
         )
 
     return call

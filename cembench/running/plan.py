@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -19,7 +19,10 @@ from cembench.registry import Algorithm, Registry
 from cembench.results.comparison import circumstances
 from cembench.results.papers import NO_PAPER, Paper
 from cembench.results.records import DEFAULT_ROUNDS, Cell, MeshFacts, MeshOrigin
-from cembench.running.sources import hash_of, sources_of
+from cembench.running.sources import hash_of, map_sources, sources_of
+
+#: The settings of a cell that is not timed.
+_UNTIMED: Mapping[str, Any] = MappingProxyType({"repeats": 1, "precision": None})
 
 
 @dataclass(frozen=True)
@@ -113,7 +116,7 @@ def plan_cells(
         if names.count(name) > 1:
             raise MeshError(f"two different surfaces are called {name!r}; rename one of the files.")
     distribute_parameters(algorithms, parameters)  # refuses what no algorithm has
-    sources = {a.name: sources_of(a) for a in algorithms}
+    sources = {a.name: sources_of(a) for a in algorithms if a.maps is None}
     tasks = []
     for mesh in meshes:
         takers = [a for a in algorithms if isinstance(mesh, a.mesh_type)]
@@ -127,11 +130,13 @@ def plan_cells(
         facts = mesh_facts(mesh, role)
         is_model = role.origin == "model" and role.paper_row in paper.models
         own = paper.as_printed(role.paper_row, algorithms) if is_model else {}
-        settings = own | dict(parameters)
-        arguments = distribute_parameters(algorithms, settings)
+        arguments = distribute_parameters(algorithms, own | dict(parameters))
         for taker in takers:
-            cell = cell_of(taker, mesh, arguments[taker.name], how, sources[taker.name])
-            tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), sources[taker.name]))
+            files, settings = sources.get(taker.name, {}), how
+            if taker.maps is not None:  # their key does not depend on how others are timed
+                files, settings = map_sources(taker, mesh.hash), replace(how, **_UNTIMED)
+            cell = cell_of(taker, mesh, arguments[taker.name], settings, files)
+            tasks.append(Task(cell, taker, mesh, facts, tuple(plugins), files))
     return tasks
 
 

@@ -60,12 +60,19 @@ class CellState:
         assert self.check is not None
         return self.check
 
+    @property
+    def is_timed(self) -> bool:
+        """Whether its map is made here, and not read from a file."""
+        return self.task.algorithm.maps is None
+
     def last_round(self, done: int, most_rounds: int) -> int:
         """Return the round after which the cell ends, or after which its interval is checked."""
         return self.task.cell.repeats or next_look(done, most_rounds)
 
     def processes_left(self, most_rounds: int) -> int:
         """Return the number of processes until it ends or its interval is checked."""
+        if not self.is_timed:
+            return int(self.check is None)
         done = len(self.rounds)
         return (self.check is None) + max(0, self.last_round(done, most_rounds) - done)
 

@@ -21,6 +21,7 @@ from importlib.metadata import distribution
 from pathlib import Path
 
 from cembench.core.errors import RegistryError
+from cembench.core.loading import sha256_of
 from cembench.registry import Algorithm
 from cembench.running.external.installed import program_sources
 
@@ -57,6 +58,16 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
     except OSError as error:
         raise RegistryError(f"algorithm {algorithm.name!r}: {error}.") from error
     return dict(sorted((more | digests).items()))
+
+
+def map_sources(algorithm: Algorithm, mesh_hash: str) -> dict[str, str]:
+    """Return the SHA-256 of the file with the map of a surface, if any, and of its target."""
+    assert algorithm.maps is not None
+    digests = {"target": hashlib.sha256(algorithm.target.encode()).hexdigest()}
+    if held := algorithm.maps.files.get(mesh_hash):
+        path = Path(held)
+        digests[f"{path.parent.name}/{path.name}"] = sha256_of(path)
+    return digests
 
 
 def hash_of(sources: Mapping[str, str]) -> str:

@@ -65,6 +65,8 @@ def test_arrays_a_file_a_pair_and_objects_give_the_same(mapped, tmp_path):
     V, F, uv = mapped.mesh.V, mapped.mesh.F, mapped.uv
     cembench.write_mesh(tmp_path / "a.obj", mapped.mesh, uv)
     cembench.write_mesh(tmp_path / "a.npz", mapped.mesh, uv)
+    np.savez(tmp_path / "corners.npz", V=V, F=F, uv=uv[F])
+    np.savez(tmp_path / "complex.npz", V=V, F=F, uv=mapped.z[F])
     textured = pyvista.make_tri_mesh(V, F)
     textured.active_texture_coordinates = uv
     plain = cembench.measure(V, F, uv).metrics
@@ -74,6 +76,8 @@ def test_arrays_a_file_a_pair_and_objects_give_the_same(mapped, tmp_path):
         cembench.measure(mapped.mesh, mapped.z),
         cembench.measure(tmp_path / "a.obj"),
         cembench.measure(tmp_path / "a.npz"),
+        cembench.measure(tmp_path / "corners.npz"),
+        cembench.measure(tmp_path / "complex.npz"),
         cembench.measure({"V": V, "F": F, "uv": uv}),
         cembench.measure(trimesh.Trimesh(V, F, visual=visual, process=False)),
         cembench.measure(textured),
@@ -123,6 +127,44 @@ def test_an_island_over_itself_is_told_from_one_over_another():
     found = cembench.measure(V, F, V[:, :2])  # the first half turn lies under the last
     assert_allclose(found.metrics["overlap_inside_islands"], 1 / 3, rtol=1e-3)
     assert found.metrics["overlap_between_islands"] == 0
+
+
+def test_an_island_that_is_folded_lies_over_itself():
+    V, F, uv = square(6)
+    uv = uv.copy()
+    uv[:, 0] = 0.1 + np.abs(uv[:, 0] - 1 / 3)  # the first third of it comes to lie on the second
+    m = cembench.measure(V, F, uv).metrics
+    assert m["flipped_triangles"] == len(F) / 3
+    assert_allclose([m["overlap_inside_islands"], m["covered_share"]], [1 / 3, 2 / 3])
+    assert m["overlap_between_islands"] == 0
+
+
+def test_both_sides_of_a_sheet_at_the_same_uvs_overlap():
+    V, F, uv = square(3)
+    both = np.concatenate([F, F[:, ::-1]])  # joined along all edges: no side bounds the island
+    m = cembench.measure(V, both, uv).metrics
+    assert m["islands"] == 1
+    assert_allclose([m["overlap_inside_islands"], m["covered_share"]], [0.5, 1])
+
+
+def test_a_texture_that_repeats_is_no_tile_of_a_set():
+    V, F, uv = square(4, size=3.0, at=-2.0)
+    found = cembench.measure(V, F, uv)
+    assert "1 of 1 island beyond one tile, where the texture repeats" in found.verdict
+    assert "covered" not in found.verdict
+    assert found.islands[0]["tile"] is None
+    V, F, uv = square(4)
+    tiles = np.concatenate([uv[F], uv[F] + np.array([2, 1])])
+    both = np.concatenate([V, V + np.array([9, 0, 0])])
+    found = cembench.measure(both, np.concatenate([F, F + len(V)]), tiles)
+    assert [one["tile"] for one in found.islands] == [1001, 1013]
+    assert "100 % of 2 tiles covered" in found.verdict
+
+
+def test_a_triangle_that_has_collapsed_to_a_point_has_no_angles():
+    V, F, uv = square(1)
+    m = cembench.measure(V, F, np.where(np.isin(np.arange(4), F[0])[:, None], 0.0, uv)).metrics
+    assert_allclose(m["angle_error_mean_deg"], 60)
 
 
 def test_the_worst_places_are_apart_and_named_by_triangle():

@@ -21,26 +21,22 @@ TABLES: tuple[tuple[str, str, str, Callable[[Entry], str]], ...] = (
 )
 
 ORACLES = """\
-**Files** are small legal meshes of every format, with what exporters add (normals, colours, texture
-coordinates, comments), damaged by one to three mutations: cut, bits flipped, lines and words
-doubled, dropped or swapped, numbers, byte order or encoding changed. Reading a file in a limited
-process must give a mesh, or an error of the project with a message; one in twenty is also given to
-`cembench map`. An independent reader, written from the specification, must find the same corners.
-A file that it finds damaged must be refused; a file that is still legal must be read.
+**Files** are small legal meshes of every format, with what exporters add (normals, colours, texture coordinates, comments), damaged by
+one to three mutations: cut, bits flipped, lines and words doubled, dropped or swapped, numbers, byte order or encoding changed. Reading a
+file in a limited process must give a mesh, or an error of the project with a message; one in twenty is also given to `cembench map`. An
+independent reader, written from the specification, must find the same corners. A file that it finds damaged must be refused; a file that
+is still legal must be read.
 
-**Meshes** (flat triangles, needles, slivers, spikes, combs, mazes, spirals, pinched and crowded
-boundaries, close holes, coordinates far away, huge or tiny, and others) go through every registered
-algorithm that takes them, judged as `run` judges a cell. For a map that is "ok", rational
-arithmetic must confirm that every triangle is counter-clockwise, that the boundary goes round the
-unit circle once and in order, and that holes are disjoint and inside. For one mesh in four, energy
-and angles are computed again with fifty digits. "Refused": the surface is not a clean manifold;
-"skipped": the algorithm does not take its topology.
+**Meshes** (flat triangles, needles, slivers, spikes, combs, mazes, spirals, pinched and crowded boundaries, close holes, coordinates far
+away, huge or tiny, and others) go through every registered algorithm that takes them, judged as `run` judges a cell. For a map that is
+"ok", rational arithmetic must confirm that every triangle is counter-clockwise, that the boundary goes round the unit circle once and in
+order, and that holes are disjoint and inside. For one mesh in four, energy and angles are computed again with fifty digits. "Refused":
+the surface is not a clean manifold; "skipped": the algorithm does not take its topology.
 
-**Kills** end a verb by SIGKILL at a random moment, in a folder full of files that look like the
-package's own. After the kill, and after a second call, these are unchanged, finished work is
-unchanged, and the folder holds the names that an undisturbed call leaves. "Had ended": the verb
-was faster than the kill.
-"""
+**Kills** end a verb by SIGKILL at a random moment, in a folder full of files that look like the package's own. After the kill, and after
+a second call, these are unchanged, finished work is unchanged, and the folder holds the names that an undisturbed call leaves. "Had
+ended": the verb was faster than the kill.
+"""  # noqa: E501
 
 
 def show(entries: Sequence[Entry], console: Console) -> None:

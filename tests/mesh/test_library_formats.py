@@ -1,5 +1,6 @@
 """Files of each kind that vtk, meshio, trimesh and NiBabel write: read, or refused with a way."""
 
+import json
 import re
 
 import numpy as np
@@ -235,3 +236,39 @@ def test_faces_with_two_corners_are_lines(tmp_path):
     assert [str(n) for n in soup.notices] == [
         "1 faces with two corners, which are lines, were ignored"
     ]
+
+
+@pytest.mark.parametrize("suffix", [".glb", ".gltf"])
+def test_uvs_of_a_mesh_without_a_material_are_read(tmp_path, suffix):
+    """As Blender writes what was only unwrapped; another part of the scene has a material."""
+    uv = V[:, :2] / 5
+    plain = trimesh.visual.TextureVisuals(uv=uv)
+    other = trimesh.visual.TextureVisuals(uv=uv, material=trimesh.visual.material.PBRMaterial())
+    scene = trimesh.Scene(
+        [
+            trimesh.Trimesh(V + np.array([0, 0, 9 * k]), F, visual=one, process=False)
+            for k, one in enumerate((plain, other))
+        ]
+    )
+    path = tmp_path / f"a{suffix}"
+    if suffix == ".glb":
+        content = without_materials(scene.export(file_type="glb"))
+        path.write_bytes(content)
+    else:
+        for name, content in scene.export(file_type="gltf").items():
+            (tmp_path / name).write_bytes(content)
+        tree = json.loads((tmp_path / "model.gltf").read_text())
+        del tree["meshes"][0]["primitives"][0]["material"]
+        path.write_text(json.dumps(tree))
+    soup = read_soup(path, uv=True)
+    assert np.isfinite(soup.uv).all()
+    assert len(soup.uv_triangles) == 2 * len(F)
+
+
+def without_materials(glb):
+    """The binary file without the material of its first mesh; its chunks keep their sizes."""
+    size = int.from_bytes(glb[12:16], "little")
+    tree = json.loads(glb[20 : 20 + size])
+    del tree["meshes"][0]["primitives"][0]["material"]
+    text = json.dumps(tree, separators=(",", ":")).encode()
+    return glb[:20] + text.ljust(size) + glb[20 + size :]

@@ -93,6 +93,8 @@ def soup_of_arrays(
 def soup_of_uv(arrays: Mapping[str, NDArray[Any]], names: Iterable[str], counted_from: int) -> Soup:
     """Build UVs without a surface from ``uv``, (k, 2) or complex (k,), and ``fuv`` (m, 3).
 
+    Those of corners may be in one array, (m, 3, 2) or complex (m, 3).
+
     Raises
     ------
     MeshError
@@ -104,6 +106,9 @@ def soup_of_uv(arrays: Mapping[str, NDArray[Any]], names: Iterable[str], counted
     if uv is None:
         present = ", ".join(names) or "none"
         raise damaged(f"it holds no array uv (k, 2); its arrays are: {present}")
+    if uv.ndim == (2 if uv.dtype.kind == "c" else 3) and uv.shape[1] == 3:
+        uv = uv.reshape(-1, *uv.shape[2:])
+        index = np.arange(len(uv)) + counted_from
     whole = np.asarray(index, dtype=np.int64).reshape(-1, 3) - counted_from
     nothing = np.empty(0, dtype=np.int64)
     return Soup(
@@ -116,7 +121,10 @@ def _complex(uv: NDArray[Any]) -> NDArray[np.complex128]:
     if uv.dtype.kind == "c":
         return np.ascontiguousarray(uv.ravel(), dtype=np.complex128)
     if uv.ndim != 2 or uv.shape[1] not in (2, 3) or uv.dtype.kind not in "fiu":
-        raise damaged(f"uv is {uv.dtype} {uv.shape}; required is real (k, 2) or complex (k,)")
+        raise damaged(
+            f"uv is {uv.dtype} {uv.shape}; required is real (k, 2) or complex (k,), "
+            "or of corners (m, 3, 2) or complex (m, 3)"
+        )
     return complex_of(uv[:, :2])
 
 

@@ -6,6 +6,7 @@ surface, and a node moves them back. Own code writes, since trimesh is an extra.
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 from dataclasses import replace
@@ -21,6 +22,8 @@ from cembench.mesh.soup import Soup, Texture, columns, complex_of, in_single_pre
 _FLOAT, _UINT32, _VERTICES, _INDICES, _REPEAT, _LINEAR, _MIPMAPS = (
     5126, 5125, 34962, 34963, 10497, 9729, 9987,
 )  # fmt: skip
+#: How a binary file of version 2 begins.
+_GLB = struct.pack("<4sI", b"glTF", 2)
 
 
 def read(path: Path, *, uv: bool = False) -> Soup:
@@ -32,7 +35,7 @@ def read(path: Path, *, uv: bool = False) -> Soup:
     import trimesh
 
     with reading_as(path.suffix[1:].upper()):
-        pieces = trimesh.load_scene(path, process=False).dump()
+        pieces = _scene(path).dump()
     meshes = [piece for piece in pieces if isinstance(piece, trimesh.Trimesh)]
     notices: tuple[Notice, ...] = ()
     if len(meshes) < len(pieces):
@@ -53,6 +56,33 @@ def read(path: Path, *, uv: bool = False) -> Soup:
     given = np.concatenate([_uv_of(mesh) for mesh in meshes]) if uv else np.empty((0, 2))
     has_uv = bool(np.isfinite(given).any())
     return replace(soup, uv=complex_of(given), uv_index=uv_index) if has_uv else soup
+
+
+def _scene(path: Path) -> Any:
+    """Load a scene; trimesh reads texture coordinates only of what has a material, so all get one.
+
+    Blender, for one, writes none for a mesh that was only unwrapped.
+    """
+    import trimesh
+
+    content = path.read_bytes()
+    start, end = 0, len(content)
+    if content[:8] == _GLB:
+        start, end = 20, 20 + struct.unpack_from("<I", content, 12)[0]
+    tree = json.loads(content[start:end])
+    parts = [part for mesh in tree.get("meshes", ()) for part in mesh["primitives"]]
+    for part in parts:
+        part.setdefault("material", len(tree.get("materials", ())))
+    tree["materials"] = [*tree.get("materials", ()), {}]
+    text = json.dumps(tree).encode()
+    if start:
+        text += b" " * (-len(text) % 4)
+        rest = content[end:]
+        sizes = struct.pack("<III", start + len(text) + len(rest), len(text), 0x4E4F534A)
+        text = _GLB + sizes + text + rest
+    resolver = trimesh.resolvers.FilePathResolver(str(path))
+    kind = path.suffix[1:].lower()
+    return trimesh.load_scene(io.BytesIO(text), file_type=kind, resolver=resolver, process=False)
 
 
 def _uv_of(mesh: Any) -> NDArray[np.float64]:

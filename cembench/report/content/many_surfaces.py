@@ -122,6 +122,8 @@ def _table(
 ) -> Table | None:
     frame = evidence.frame
     tried = frame[frame["main"] & (frame["target"] == target) & (frame["solves"] == policy)]
+    if figure == "seconds":
+        tried = tried[tried["external"] != "maps"]  # which have none
     series = [s for s in evidence.series_to(target) if s.label in set(tried["label"])]
     if len(series) < 2:
         return None

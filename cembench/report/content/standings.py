@@ -82,12 +82,15 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
 
     Those that mapped fewer than :data:`SHARE` of what others did are `absent`. The names are those
     of `findings.toml`; empty if there is no surface. `order` has the smallest angle errors first,
-    `good` the algorithms that are as good as the best on every surface, the fastest first.
+    `alike` the algorithms that are as good as the best on every surface, `good` those of them that
+    were timed, the fastest first; the maps of the `untimed` were read from files.
     """
     frame = evidence.frame
     rows = frame[(frame["target"] == target) & frame["main"] & (frame["solves"] == policy)]
     # An angle error to which the surface was fitted decides nothing.
-    maps = rows[rows["ok"] & ~rows["fitted"] & (rows["seconds"] > 0) & rows[ANGLE].notna()]
+    given = rows["external"] == "maps"
+    usable = ~rows["fitted"] & ((rows["seconds"] > 0) | given) & rows[ANGLE].notna()
+    maps = rows[rows["ok"] & usable]
     if maps.empty:
         return {}
     wide = maps.pivot(index="place", columns="label", values=["key", ANGLE, "seconds"])
@@ -103,11 +106,17 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
     means = {one: _over_families(angles[one], families).mean for one in chosen}
     order = best, *others = sorted(chosen, key=means.__getitem__)
     least = angles[order].min(axis=1)
-    good = [one for one in order if as_good(angles[one], least)]
+    alike = [one for one in order if as_good(angles[one], least)]
+    untimed = {*rows["label"][given]}
+    good = [one for one in alike if one not in untimed]
     good.sort(key=lambda one: _over_families(seconds[one], families).mean)
     against = {one: _over_families(angles[one] / angles[best], families) for one in others}
     sure = {o for o, speeds in against.items() if speeds.interval and speeds.interval.low > 1}
-    speeds = {one: _speeds(evidence, keys[one], keys[good[0]], families) for one in order}
+    first = keys[good[0]] if good else None
+    speeds = {
+        one: None if first is None else _speeds(evidence, keys[one], first, families)
+        for one in order
+    }
     start, title = _TARGETS.get(target, (f"{target}, on", ""))[0], title_of(target)
     few = len(set(families)) < FEWEST_FAMILIES
     known: dict[str, Any] = {
@@ -116,7 +125,8 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
         **{"n": len(common), "surfaces": len(wide), "families": len(set(families)), "few": few},
         **{"absent": [one for one in tried if one not in chosen], "times": AS_GOOD},
         "fitted": set(rows["label"][rows["fitted"]]),
-        **{"worse": [one for one in order if one not in good], "degrees": DEGREES},
+        **{"worse": [one for one in order if one not in alike], "degrees": DEGREES},
+        **{"alike": alike, "untimed": untimed},
         **{"names": listed, "surfaces_words": surfaces_words, "against": against},
         **{"speeds": speeds, "within": f"{100 * NEAR:.0f}", "ended": _ended(rows)},
     }
@@ -127,7 +137,7 @@ def contest_of(evidence: Evidence, policy: str, target: str = DISK) -> dict[str,
     if others:
         unsure = [one for one in others if one not in sure]
         known |= {"second": others[0], "sure": others[0] in sure, "unsure": unsure}
-        known |= {"equal": [one for one in unsure if one in good]}
+        known |= {"equal": [one for one in unsure if one in alike]}
         known |= {"ratio": against[others[0]].mean, "interval": against[others[0]].interval}
     fastest = speeds[good[1]] if len(good) > 1 else None
     known |= {"verdict": fastest and fastest.verdict, "speed_ratio": fastest and fastest.ratio}
@@ -203,8 +213,16 @@ def standings(contest: Mapping[str, Any]) -> Table:
         for label in contest["absent"]
     ]
     name = "standings" if contest["target"] == DISK else f"standings-{slug(contest['target'])}"
-    but = "" if len(good) > 1 else " No other is about as good."
-    texts = {"fastest": good[0], "but": but, "fewest": FEWEST_FAMILIES}
+    alike = len(contest["alike"])
+    fastest = f"The fastest is {good[0]}" if good else "None was timed"
+    if len(good) == 1 < alike:
+        fastest = f"Only {good[0]} was timed"
+    texts = {
+        "time": f"time over {good[0]}'s" if good else "time",
+        "fastest": fastest,
+        "but": "" if alike > 1 else " No other is about as good.",
+        "fewest": FEWEST_FAMILIES,
+    }
     return given_table("standings", rows, {**contest, **texts}, called=name)
 
 
@@ -226,10 +244,14 @@ def _ranked(contest: Mapping[str, Any]) -> Iterator[list[Plain]]:
             _ratio(over.mean, over.interval, ".3f") if over else Value("1", 1.0, "derived"),
             *(contest["smallest"][label], contest["nearly"][label]),
             Value("1", 1.0, "derived")
-            if label == contest["good"][0]
+            if label in contest["good"][:1]
             else _ratio(speed.ratio, speed.interval, ".2f")
             if speed
-            else missing("no round with both"),
+            else missing(
+                "the maps were read from files"
+                if label in contest["untimed"]
+                else "no round with both"
+            ),
         ]
 
 

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cembench.conformal.planar import fitted_circle, polygon_area
-from cembench.core.errors import CembenchError, MeshError
+from cembench.core.arrays import Complex
+from cembench.core.errors import CembenchError, MeshError, NotThere
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.files import write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
-from cembench.mesh.uvs import OtherSurfaceError, read_flat, read_uv, uv_of_corners
+from cembench.mesh.uvs import OtherSurfaceError, read_flat, read_uv, read_with_uv, uv_of_corners
 from cembench.registry import Algorithm
 from cembench.results.records import FaultKind, Status
+from cembench.running.map_promises import WITH_HOLES
 
 #: Size limit of a file with UVs: bytes, and bytes per vertex and triangle.
 LARGEST_OUTPUT, LARGEST_SHARE = 2**24, 4096
@@ -57,7 +59,7 @@ def largest_output(mesh: TriangleMesh) -> int:
 
 
 def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Parameterization | Atlas:
-    """Read a program's output as a map to its target.
+    """Read a file that a program, or somebody, wrote as a map to the algorithm's target.
 
     Raises
     ------
@@ -68,7 +70,9 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
     _check_output(path, mesh)
     try:
         program = algorithm.program
-        read = read_flat if program is not None and program.flat else read_uv
+        read = read_uv if program is not None else read_with_uv
+        if program is not None and program.flat:
+            read = read_flat
         corners = uv_of_corners(read(path), mesh.V, mesh.F)
     except OtherSurfaceError as error:
         message = f"{path.name} is not a map of the surface that it was given: {error}"
@@ -78,10 +82,19 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
         raise ProgramFault(FaultKind.UNREADABLE_OUTPUT, message) from None
     if algorithm.target == "atlas":
         return Atlas(corners)
-    uv = _of_vertices(corners, mesh)
-    if program is not None and program.fit:
+    uv = of_vertices(corners, mesh)
+    if program.fit if program is not None else algorithm.target in ("disk", *WITH_HOLES):
         uv = _in_unit_circle(uv, mesh)
     return Parameterization(uv)
+
+
+def read_map(algorithm: Algorithm, mesh: TriangleMesh) -> Parameterization | Atlas:
+    """Read the map of a surface that somebody made; raise :class:`NotThere` without a file."""
+    assert algorithm.maps is not None
+    path = algorithm.maps.files.get(mesh.hash)
+    if path is None:
+        raise NotThere(f"no file in {algorithm.maps.folder} holds a map of this surface")
+    return read_output(Path(path), algorithm, mesh)
 
 
 def _check_output(path: Path, mesh: TriangleMesh) -> None:
@@ -105,7 +118,7 @@ def _check_output(path: Path, mesh: TriangleMesh) -> None:
         raise ProgramFault(FaultKind.OUTPUT_TOO_LARGE, message)
 
 
-def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+def of_vertices(corners: Complex, mesh: TriangleMesh) -> Complex:
     """Return the UV of each vertex (n,); raise if its corners have different ones."""
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[mesh.F] = corners
@@ -114,7 +127,7 @@ def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray
     if len(apart):
         message = (
             f"{len(apart)} vertices have several UVs, the first being {apart[0]}: the surface was "
-            'cut. Declare the target "atlas" for such a program'
+            'cut. Declare the target "atlas" for such maps'
         )
         raise ProgramFault(FaultKind.CUT_SURFACE, message, status="invalid")
     return uv

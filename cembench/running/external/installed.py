@@ -23,6 +23,8 @@ def external_of(algorithm: Algorithm) -> External | None:
         return External(kind="program", name=str(algorithm.program))
     if algorithm.library is not None:
         return External(kind="library", name=algorithm.library.package)
+    if algorithm.maps is not None:
+        return External(kind="maps", name=algorithm.maps.folder)
     return None
 
 
