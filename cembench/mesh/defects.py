@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -199,14 +200,16 @@ class RepairLossError(MeshError):
         return f"{where}a repair would keep only {self.kept}. {way}{drop} allows the loss."
 
 
-def located(error: MeshError, path: Path | None) -> MeshError:
-    """Return the error with the path of its file, if there is one."""
-    if path is None:
-        return error
-    if isinstance(error, UnusableMeshError | RepairLossError):
-        error.path = path
-        return error
-    return MeshError(f"{path}: {error}")
+@contextmanager
+def located(path: Path | None) -> Iterator[None]:
+    """Name a surface's file, if there is one, in errors that are raised in this block."""
+    try:
+        yield
+    except (UnusableMeshError, RepairLossError) as error:
+        error.path = path or error.path
+        raise
+    except MeshError as error:
+        raise (error if path is None else MeshError(f"{path}: {error}")) from None
 
 
 def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
@@ -322,7 +325,7 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
     problems = [p for p in findings if p is not None]
     if not problems:
         slivers = np.flatnonzero(areas <= SLIVER_AREA)
-        return Examination(facing, (*_slivers(slivers), *_turned(turned)), ())
+        return Examination(facing, _remarks(slivers, turned), ())
     if len(valid):
         one_sided = any(p.defect is Defect.one_sided for p in problems)
         more = [
@@ -412,14 +415,10 @@ def representatives(V: Points, tolerance: float = 0.0) -> Indices:
     if tolerance == 0:
         _, first, place = np.unique(V + 0.0, axis=0, return_index=True, return_inverse=True)
         return first[place.reshape(-1)]
-    from scipy import sparse
-    from scipy.sparse import csgraph
     from scipy.spatial import cKDTree
 
     i, j = cKDTree(V).query_pairs(tolerance, output_type="ndarray").T
-    graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(V), len(V)))
-    _, place = csgraph.connected_components(graph, directed=False)
-    return np.unique(place, return_index=True)[1][place]
+    return topology.first_of_linked(i, j, len(V))
 
 
 def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
@@ -490,23 +489,18 @@ def some(indices: NDArray[np.int64], most: int = 5) -> str:
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
-def _slivers(thin: Indices) -> tuple[Notice, ...]:
-    """Return a notice if some triangles are slivers."""
-    if not len(thin):
-        return ()
-    message = (
-        f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
-        f"{some(thin)}; energies and dilatations lose digits in rounding there"
-    )
-    return (Notice(NoticeKind.SLIVERS, message),)
-
-
-def _turned(turned: Mask) -> tuple[Notice, ...]:
-    """Return a notice if some triangles were reversed."""
-    if not turned.any():
-        return ()
-    message = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
-    return (Notice(NoticeKind.ORIENTATION_REPAIRED, message),)
+def _remarks(thin: Indices, turned: Mask) -> tuple[Notice, ...]:
+    """Return notices of slivers, and of triangles that were reversed, if there are any."""
+    texts = {}
+    if len(thin):
+        texts[NoticeKind.SLIVERS] = (
+            f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
+            f"{some(thin)}; energies and dilatations lose digits in rounding there"
+        )
+    if turned.any():
+        count = f"{turned.sum()} of {len(turned)} triangles were turned over"
+        texts[NoticeKind.ORIENTATION_REPAIRED] = f"orientation repaired: {count}"
+    return tuple(Notice(kind, text) for kind, text in texts.items())
 
 
 def _used(F: Indices, n: int) -> Mask:
@@ -566,26 +560,21 @@ def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
         return []
     edges, faces = topology.undirected_edges(F)
     bad = np.flatnonzero(faces > 2)
-    if not len(bad):
-        return [_one_sided(contradictions, closed=bool((faces == 2).all()))]
-    i, j = edges[bad[0]].tolist()
-    message = (
-        f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
-        f"{i}-{j} with {faces[bad[0]]}"
-    )
-    return [Problem(Defect.edges, len(bad), message)]
-
-
-def _one_sided(contradictions: Indices, *, closed: bool) -> Problem:
-    """Return the problem that a surface with manifold edges is one-sided."""
+    if len(bad):
+        i, j = edges[bad[0]].tolist()
+        message = (
+            f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
+            f"{i}-{j} with {faces[bad[0]]}"
+        )
+        return [Problem(Defect.edges, len(bad), message)]
     i, j = contradictions[0].tolist()
+    closed = (faces == 2).all()
     kind = "closed and one-sided (like a Klein bottle)" if closed else "one-sided (like a Moebius"
-    return Problem(
-        Defect.one_sided,
-        len(contradictions),
-        f"the surface is {kind}{'' if closed else ' strip)'}: the triangles at edge {i}-{j} "
-        "cannot be oriented consistently; a repair cuts the surface there",
+    message = (
+        f"the surface is {kind}{'' if closed else ' strip)'}: the triangles at edge {i}-{j} cannot "
+        "be oriented consistently; a repair cuts the surface there"
     )
+    return [Problem(Defect.one_sided, len(contradictions), message)]
 
 
 def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:

@@ -199,9 +199,9 @@ def _check_file(path: Path) -> None:
     for ends, what in _NO_SURFACES.items():
         if path.name.lower().endswith(ends):
             raise MeshError(f"{what}.")
+    with path.open("rb") as file:
+        begin = file.read(3)
     if not is_named_like_a_mesh(path):
-        with path.open("rb") as file:
-            begin = file.read(3)
         if begin == _VALUES:
             raise MeshError(
                 "it holds FreeSurfer values of vertices, such as a thickness; name the file of the "
@@ -214,11 +214,10 @@ def _check_file(path: Path) -> None:
             )
     if status.st_size == 0:
         raise MeshError("the file is empty (0 bytes). Export or download it again.")
-    with path.open("rb") as file:
-        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
-            raise MeshError(
-                "it is text in UTF-16, as `>` of Windows PowerShell 5 writes it. Save it as UTF-8."
-            )
+    if begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise MeshError(
+            "it is text in UTF-16, as `>` of Windows PowerShell 5 writes it. Save it as UTF-8."
+        )
 
 
 def read_mesh(
@@ -313,10 +312,8 @@ def repair_soup(soup: Soup, path: Path | None = None, **options: Any) -> Repaire
     if path is not None and copies is None and path.suffix.lower() in _WITH_UV_OF_VERTICES:
         with suppress(MeshError):  # of texture coordinates, which a repair can do without
             copies = _has_uv_of_vertices(read_soup(path, uv=True)) or None
-    try:
+    with located(path):
         return repair(soup.V, soup.corners, soup.sizes, copies=copies, **options)
-    except MeshError as error:
-        raise located(error, path) from None
 
 
 def _has_uv_of_vertices(soup: Soup) -> bool:
@@ -351,9 +348,8 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
         text = f"{polygons} polygons were cut into triangles"
         notices += (Notice(NoticeKind.POLYGONS_CUT, text),)
     try:
-        return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
-    except MeshError as error:
-        raise located(error, path) from None
+        with located(path):
+            return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
     except MemoryError as error:
         raise MeshError(
             f"{path or soup.name}: memory does not suffice to check {len(soup.V):,} vertices and "
@@ -393,16 +389,10 @@ def write_mesh(
     >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
 
     """
-    path = Path(path)
-    try:
-        n = mesh.n
-        allowed = (
-            f"one value for each of the {n} vertices: complex, shape ({n},), or real, "
-            f"shape ({n}, 2)"
-        )
+    path, n = Path(path), mesh.n
+    allowed = f"one value for each of the {n} vertices: complex, shape ({n},), or real, ({n}, 2)"
+    with located(path):
         z = None if uv is None else complex_images(uv, [(n,)], allowed)
-    except MeshError as error:
-        raise located(error, path) from None
     write_soup(path, Soup.of_triangles(mesh.V, mesh.F, z, name=mesh.name))
 
 

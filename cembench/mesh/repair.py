@@ -83,10 +83,6 @@ class Step(StrEnum):
     isolated = "isolated_vertices_removed", "isolated vertices removed"
 
 
-#: Description of each step for messages.
-TITLES: dict[str, str] = {step: step.meaning for step in Step}
-
-
 class Kept(NamedTuple):
     """How much of a surface a repair keeps."""
 
@@ -132,7 +128,7 @@ class Repaired:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """One notice for each step that changed something, and what is kept if not all is."""
-        texts = [f"{n:,} {TITLES[step]}" for step, n in self.steps.items() if n]
+        texts = [f"{n:,} {step.meaning}" for step, n in self.steps.items() if n]
         if self.kept.area < _TOLD or not self.kept.is_whole:
             texts.append(f"{self.kept} are kept")
         return tuple(Notice(NoticeKind.REPAIRED, f"repaired: {text}") for text in texts)

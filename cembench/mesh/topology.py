@@ -50,10 +50,20 @@ def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
 def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
     """Return the number of connected components of triangles or edges, and that of each vertex."""
     # Two sides connect the corners of a triangle, one the ends of an edge.
-    i, j = np.repeat(F[:, 0], F.shape[1] - 1), F[:, 1:].ravel()
-    graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    return linked(np.repeat(F[:, 0], F.shape[1] - 1), F[:, 1:].ravel(), n)
+
+
+def linked(i: Faces, j: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
+    """Return the number of pieces of n points that are linked in pairs i, j, and that of each."""
+    graph = scipy.sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(n, n))
     count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
+
+
+def first_of_linked(i: Faces, j: Faces, n: int) -> NDArray[np.int64]:
+    """Return the first point of the piece of each of n points that are linked in pairs i, j."""
+    _, piece = linked(i, j, n)
+    return np.unique(piece, return_index=True)[1][piece]
 
 
 def euler_characteristic(F: Faces, n: int) -> int:

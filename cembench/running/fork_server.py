@@ -149,17 +149,11 @@ class _Forked:
         return self.code
 
 
-@dataclass(frozen=True)
-class _ForkRequest:
-    """The job of a forked process, and its mark."""
+def _serve() -> dict[str, str]:
+    """Answer requests on standard input, one per line; return that of each forked process in it.
 
-    job: str
-    log: str
-    mark: str
-
-
-def _serve() -> _ForkRequest:
-    """Answer requests on standard input, one per line; return in every forked process."""
+    Such a request has the job's file, the log and the mark.
+    """
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
     child, code, cpu = 0, None, 0
     _say(0, None)
@@ -176,7 +170,8 @@ def _serve() -> _ForkRequest:
             continue
         child, code = os.fork(), None
         if not child:
-            return _ForkRequest(**request)
+            order: dict[str, str] = request
+            return order
         with suppress(OSError):  # already done by the child, or the child has ended
             os.setpgid(child, child)
         _say(number, child)
@@ -202,12 +197,12 @@ def _say(number: int, answer: int | None) -> None:
     os.write(1, json.dumps([number, answer]).encode() + b"\n")
 
 
-def _set_up_process(order: _ForkRequest) -> None:
+def _set_up_process(order: dict[str, str]) -> None:
     """Join a new process group, set the mark, close the input, and write to the log."""
     os.setpgid(0, 0)
     for file, way, targets in (
         (os.devnull, os.O_RDONLY, (0,)),
-        (order.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
+        (order["log"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
     ):
         opened = os.open(file, way)
         for target in targets:
@@ -216,8 +211,8 @@ def _set_up_process(order: _ForkRequest) -> None:
     # Overwrites the placeholder where the system reads the environment of a process.
     getenv = ctypes.CDLL(None).getenv
     getenv.restype = ctypes.c_void_p
-    ctypes.memmove(getenv(MARK.encode()), order.mark.encode(), len(_NO_MARK))
-    os.environ[MARK] = order.mark
+    ctypes.memmove(getenv(MARK.encode()), order["mark"].encode(), len(_NO_MARK))
+    os.environ[MARK] = order["mark"]
     np.random.seed()  # noqa: NPY002 - of the global generator; Python's own is seeded by the fork
 
 
@@ -239,7 +234,7 @@ def _main(parent: int, backend: str) -> None:
     _load(backend)
     order = _serve()
     _set_up_process(order)
-    worker.main(Path(order.job))
+    worker.main(Path(order["job"]))
     worker.end()
 
 

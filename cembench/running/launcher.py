@@ -101,7 +101,8 @@ class Launcher:
             **more,
         )
         limits = Limits(seconds, self.options.memory_bytes)
-        ending = (self._by_judges if judges else self._forked)(job, limits, log)
+        server = judges_server(self.number) if judges else self._own_server(job)
+        ending = server and self._forked(server, job, limits, log)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # the folder may be gone
             remove(programs)  # of a program that was ended
@@ -146,8 +147,8 @@ class Launcher:
         start = spawning(command, for_measuring(job.cell.threads))
         return run_limited(start, limits, log, stopped=self.stopped.is_set)
 
-    def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """Run a process forked from the server; return its end, None if it cannot fork."""
+    def _own_server(self, job: Job) -> ForkServer | None:
+        """Return the server of processes with this job's back end; None if none can be forked."""
         if not self.forks or not can_fork(job.cell.threads):
             return None
         if self._server is None or self._server.backend != job.cell.backend:
@@ -156,32 +157,22 @@ class Launcher:
                 self._server = ForkServer(for_measuring(job.cell.threads), job.cell.backend)
             except ServerGoneError:
                 self.forks = False
-                return None
-        ending = self._run_by(self._server, job, limits, log)
-        if ending is None:
-            self.close()
-        return ending
+        return self._server
 
-    def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """Run a judge forked from its server; return how it ended, None if it cannot be forked."""
-        server = judges_server(self.number)
-        if server is None:
-            return None
-        ending = self._run_by(server, job, limits, log, alone=True)
-        if ending is None:
-            judges_server.cache_clear()
-            server.close()
-        return ending
-
-    def _run_by(
-        self, server: ForkServer, job: Job, limits: Limits, log: Path, *, alone: bool = False
-    ) -> ProcessEnd | None:
+    def _forked(self, server: ForkServer, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
         """Run a process forked from this server; return its end, None if the server is gone."""
         path = self._write(job.model_copy(update={"parent": server.pid}))
-        with suppress(ServerGoneError):
+        judges = server is not self._server  # they start no processes
+        try:
             start = server.forking(path)
-            end = run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
+            end = run_limited(start, limits, log, alone=judges, stopped=self.stopped.is_set)
             return replace(end, cpu_seconds=server.cpu_seconds())
+        except ServerGoneError:
+            if judges:
+                judges_server.cache_clear()
+                server.close()
+            else:
+                self.close()
         return None
 
     def _write(self, job: Job) -> Path:

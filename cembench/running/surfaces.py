@@ -143,10 +143,8 @@ def prepared(
         soup, repaired = repaired_soup(soup, path)
     if cut:
         uncut = checked(soup, TriangleMesh, path)
-        try:
+        with located(path):
             opened = cut_open(uncut)
-        except MeshError as error:
-            raise located(error, path) from None
         return SurfaceFile(file, opened.mesh, repaired, uncut, opened)
     return SurfaceFile(file, most_special(soup, kinds, path), repaired)
 

@@ -30,7 +30,9 @@ from cembench.mesh.soup import (
     in_single_precision,
     no_faces,
     numbers_of,
+    refuse_underscores,
     shown,
+    to_number,
     unreadable,
 )
 
@@ -267,10 +269,12 @@ def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
     if numbers is not None:
         return numbers
     for number, line in enumerate(body.tobytes().decode("latin-1").splitlines(), header_lines + 1):
-        for word in line.split():
-            if not _is_number(word):
-                error = ValueError(f"{shown(word)} is not a number")
-                raise unreadable(f"line {number}", line, error)
+        try:
+            for word in line.split():
+                to_number(float, word)
+            refuse_underscores(line.split())
+        except ValueError as error:
+            raise unreadable(f"line {number}", line, error) from None
     raise damaged("the body holds a word that is not a number")
 
 
@@ -297,15 +301,6 @@ def _check_lines(elements: list[_Element], body: Bytes) -> None:
                 f"{element.name!r} {wrong[0]} (counted from 0) has {own[wrong[0]]} numbers on its "
                 f"line; the header declares {len(element.properties)}"
             )
-
-
-def _is_number(word: str) -> bool:
-    """Whether a word is a number in ASCII files."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return "_" not in word
 
 
 def _as_doubles(element: _Element) -> _Element:

@@ -226,20 +226,16 @@ class _ClusterRun:
         job = worker.job
         if job is None or future is not job.future:
             return
-        error = future.exception() if future.status == "error" else None
-        if isinstance(error, KilledWorker):
-            self._give_up(worker, job, error.allowed_failures + 1)
-        elif error is not None:
+        try:
+            answer = future.result(timeout=ARRIVES_WITHIN)
+        except (OSError, TimeoutError, CancelledError, KilledWorker):  # its worker has just ended
+            self._look()
+            self._lose(worker)
+        except Exception as error:
             name = job.unit.mesh.name
             raise ClusterError(f"{name} cannot be measured on {worker.machine}: {error}") from error
         else:
-            try:
-                answer = future.result(timeout=ARRIVES_WITHIN)
-            except (OSError, TimeoutError, CancelledError):  # its worker has just ended
-                self._look()
-                self._lose(worker)
-            else:
-                self._save(worker, job, answer)
+            self._save(worker, job, answer)
 
     def _save(self, worker: _Worker, job: _Job, answer: Answer) -> None:
         missing = dict(job.tasks)
@@ -270,7 +266,7 @@ class _ClusterRun:
             self.client.cancel([job.future], force=True)
         job.lost += 1
         if job.lost >= MOST_LOST:
-            self._give_up(worker, job, job.lost)
+            self._give_up(worker, job)
             return
         worker.job = None
         self.waiting.append(job)
@@ -279,10 +275,10 @@ class _ClusterRun:
             f"{worker.machine} was lost{job.during}"
         )
 
-    def _give_up(self, worker: _Worker, job: _Job, lost: int) -> None:
+    def _give_up(self, worker: _Worker, job: _Job) -> None:
         """Record the cells of a unit that ended its workers as failed."""
         detail = (
-            f"its surface ended {lost} workers that measured it, the last on "
+            f"its surface ended {job.lost} workers that measured it, the last on "
             f"{worker.machine}{job.during}"
         )
         outcome = not_ok("failed", Fault(kind=FaultKind.WORKERS_LOST, detail=detail))
