@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.core.arrays import Real
 
@@ -96,9 +95,9 @@ class Head:
         return np.stack([x, y, z], axis=1)
 
     @cached_property
-    def _points(self) -> dict[str, NDArray[np.float64]]:
+    def _points(self) -> dict[str, Real]:
         # Assigned at once, since fields are evaluated on several threads.
-        P, c = self.person, dict[str, NDArray[np.float64]]()
+        P, c = self.person, dict[str, Real]()
         c["mouth"] = self._mouth()
         for s, side in ((-1, "right"), (1, "left")):
             x = 0.275 * s
@@ -191,7 +190,7 @@ class Head:
         hollow = ellipsoid(p, at + (0.065 * s, -0.02, 0.03), (0.06, 0.10, 0.17), turn)
         return carve(d, hollow, 0.04)
 
-    def landmarks(self) -> dict[str, NDArray[np.float64]]:
+    def landmarks(self) -> dict[str, Real]:
         """Return points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
         c, P, mouth = self._points, self.person, self._between_lips()
         vertices = {

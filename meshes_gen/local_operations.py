@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Mask, Real
 
 
 @dataclass(frozen=True)
@@ -28,11 +27,11 @@ class Edges:
     corner: Indices
 
     @property
-    def on_boundary(self) -> NDArray[np.bool_]:
+    def on_boundary(self) -> Mask:
         """Whether each edge has a single triangle."""
         return self.face[:, 1] < 0
 
-    def rim(self, n: int) -> NDArray[np.bool_]:
+    def rim(self, n: int) -> Mask:
         """Return whether each of the n vertices is on the boundary."""
         mask = np.zeros(n, dtype=bool)
         mask[self.ends[self.on_boundary]] = True
@@ -60,7 +59,7 @@ def edges_of(F: Indices, n: int) -> Edges:
     )
 
 
-def boundary_mask(F: Indices, n: int) -> NDArray[np.bool_]:
+def boundary_mask(F: Indices, n: int) -> Mask:
     """Whether each of the n vertices is on the boundary."""
     return edges_of(F, n).rim(n)
 
@@ -105,7 +104,7 @@ def mean_of_neighbours(V: Real, F: Indices) -> Real:
     return total / np.maximum(count, 1)[:, None]
 
 
-def _ranks(priority: Real) -> NDArray[np.int64]:
+def _ranks(priority: Real) -> Indices:
     """Return ranks from 1 for the lowest priority; ties are broken by position."""
     ranks = np.empty(len(priority), dtype=np.int64)
     ranks[np.argsort(priority, kind="stable")] = np.arange(1, len(priority) + 1)
@@ -113,7 +112,7 @@ def _ranks(priority: Real) -> NDArray[np.int64]:
 
 
 def split(
-    V: Real, F: Indices, edges: Edges, chosen: NDArray[np.int64], priority: Real
+    V: Real, F: Indices, edges: Edges, chosen: Indices, priority: Real
 ) -> tuple[Real, Indices]:
     """Split those `chosen` edges that have the first `priority` in both of their triangles."""
     rank = _ranks(priority)
@@ -137,12 +136,7 @@ def split(
 
 
 def collapse(
-    V: Real,
-    F: Indices,
-    edges: Edges,
-    chosen: NDArray[np.int64],
-    length: Real,
-    most: int | None = None,
+    V: Real, F: Indices, edges: Edges, chosen: Indices, length: Real, most: int | None = None
 ) -> tuple[Real, Indices]:
     """Collapse an independent set of the `chosen` edges, the shortest by `length` first.
 
@@ -234,7 +228,7 @@ class Quads:
         """Return the same sums for the other diagonal p q."""
         return _cotangents(V, self.i, self.p, self.q) + _cotangents(V, self.j, self.q, self.p)
 
-    def folds(self, V: Real) -> NDArray[np.bool_]:
+    def folds(self, V: Real) -> Mask:
         """Whether the other diagonal would fold the surface."""
         T = (V[self.p], V[self.i], V[self.q], V[self.j])
         old0, old1 = np.cross(T[1] - T[0], T[3] - T[0]), np.cross(T[3] - T[2], T[1] - T[2])
@@ -247,7 +241,7 @@ class Quads:
             folded |= np.linalg.norm(new, axis=1) <= 1e-4 * size
         return folded
 
-    def take(self, k: NDArray[np.int64] | NDArray[np.bool_]) -> Quads:
+    def take(self, k: Indices | Mask) -> Quads:
         """Return a selection of them."""
         return Quads(self.i[k], self.j[k], self.p[k], self.q[k], self.face[k])
 

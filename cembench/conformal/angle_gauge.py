@@ -9,7 +9,6 @@ be the best.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.metrics import (
     SampledAngleError,
@@ -19,7 +18,7 @@ from cembench.conformal.metrics import (
 )
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import texel_density_ratio
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
 
 #: The search begins with moves of the disk's centre by this hyperbolic length ...
@@ -65,7 +64,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
 
     sampled, tried = SampledAngleError(mesh), list[tuple[float, tuple[float, ...]]]()
 
-    def error_at(move: NDArray[np.float64]) -> float:
+    def error_at(move: Real) -> float:
         tried.append((sampled(_moved(mesh, uv, move)), tuple(move.tolist())))
         return tried[-1][0]
 
@@ -83,7 +82,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
     return uv
 
 
-def _moved(mesh: DiskMesh, uv: Complex, move: NDArray[np.float64]) -> Complex:
+def _moved(mesh: DiskMesh, uv: Complex, move: Real) -> Complex:
     """Return a map after the Moebius map that takes the point at `move` to the disk's centre.
 
     `move` has the point's hyperbolic coordinates: half its distance along its direction.

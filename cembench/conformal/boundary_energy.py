@@ -22,12 +22,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.trust_region import newton_step
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
@@ -345,7 +344,7 @@ class EnergyModel:
         return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
 
     @cached_property
-    def held(self) -> NDArray[np.int64]:
+    def held(self) -> Indices:
         """The arcs that have their minimal length and would become shorter downhill."""
         rims, B = self.domain.rims, len(self.domain.arcs)
         short = self.domain.shortest(MOST_HELD)
@@ -362,7 +361,7 @@ class EnergyModel:
             constraints = self._keeping(held)
         return held
 
-    def _keeping(self, held: NDArray[np.int64]) -> tuple[Real, Real, Real]:
+    def _keeping(self, held: Indices) -> tuple[Real, Real, Real]:
         """The constraints of the gauge, and those that keep the length of some arcs."""
         if not len(held):
             return self._gauge

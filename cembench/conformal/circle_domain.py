@@ -12,10 +12,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.moebius import Moebius
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real
 
 #: Minimal share of its initial length that every arc keeps, so that no vertices meet.
 LEAST_SHARE = 0.1
@@ -61,7 +60,7 @@ class BoundaryLoops:
         return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     @cached_property
-    def on_outer(self) -> NDArray[np.bool_]:
+    def on_outer(self) -> Mask:
         """Whether each vertex is on the outer circle, shape (B,)."""
         return self.loop == self.outer
 

@@ -12,12 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.planar import backward_arcs, folded_triangles, winding_words
 from cembench.conformal.untangling import untangled
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.topology import vertex_graph
@@ -118,9 +117,7 @@ def interior_without_folds(
     return z, rounds
 
 
-def _accepted(
-    mesh: TriangleMesh, before: Complex, after: Complex, patch: NDArray[np.int64]
-) -> Complex:
+def _accepted(mesh: TriangleMesh, before: Complex, after: Complex, patch: Indices) -> Complex:
     """Return the repaired map, with patches that still have folds put back."""
     folded = np.unique(patch[folded_triangles(after, mesh.F)])
     back = np.unique(mesh.F[np.isin(patch, folded[folded >= 0])])
@@ -129,7 +126,7 @@ def _accepted(
     return accepted
 
 
-def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
+def _folded(mesh: TriangleMesh, z: Complex) -> Indices:
     """Return the folded triangles, in the phase "folds"."""
     with phase("folds"):
         return folded_triangles(z, mesh.F)

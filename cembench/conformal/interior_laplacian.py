@@ -19,7 +19,7 @@ from cembench.conformal.boundary_modes import InverseByModes
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.ring_order import ENTRIES, OPERATIONS_AN_ENTRY
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky, keeps_factors
 from cembench.linear_algebra.lower_triangle import permuted_lower
@@ -102,7 +102,7 @@ class InteriorLaplacian:
         self,
         mesh: TriangleMesh,
         L: scipy.sparse.csc_array,
-        boundary: NDArray[np.int64],
+        boundary: Indices,
         measure: Real,
         *,
         by_position: bool = False,
@@ -162,9 +162,7 @@ class InteriorLaplacian:
         return np.asarray(self.L_bb @ f + self._L_bn @ self.harmonic_near(f))
 
 
-def _sparse_columns(
-    inside: Real, L_bi: scipy.sparse.csr_array
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+def _sparse_columns(inside: Real, L_bi: scipy.sparse.csr_array) -> tuple[Mask, Mask, Indices]:
     """Return which columns (n_i, k) have many entries, which have few, and the rows of interest.
 
     These rows are the boundary's neighbours and those of the columns with few entries, fewer than

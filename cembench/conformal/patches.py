@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
-from cembench.core.arrays import Loop, Real
+from cembench.core.arrays import Indices, Loop, Real
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 #: Height of a fan's triangle, as a share of its base, below which it has no area.
@@ -23,7 +22,7 @@ SLIM = 1e-9
 _TERMS = 28
 
 
-def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
+def fan(loop: Loop, centre: int) -> Indices:
     """Return the triangles (k, 3) that fill a hole from a centre, oriented like the surface.
 
     `loop` has the surface on its left, as in ``mesh.loops``.

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.blocks import in_blocks
 
 #: The sign of an area computed in doubles is certain if it exceeds this share of its terms
@@ -26,22 +26,22 @@ def polygon_area(z: Complex) -> float:
     return 0.5 * float(np.imag(np.conj(w) * np.roll(w, -1)).sum())
 
 
-def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
+def signed_areas(uv: Complex, F: Indices) -> Real:
     """Return the area of each triangle's image, shape (m,); positive if counter-clockwise."""
 
-    def of_triangles(F: NDArray[np.int64]) -> NDArray[np.float64]:
+    def of_triangles(F: Indices) -> Real:
         a, b, c = (uv.take(F[:, k]) for k in range(3))
         return 0.5 * np.imag(np.conj(b - a) * (c - a))
 
     return in_blocks(of_triangles, F)
 
 
-def folded_triangles(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int64]:
+def folded_triangles(uv: Complex, F: Indices) -> Indices:
     """Return the triangles whose image has no positive area, by its exact sign."""
     return np.flatnonzero(orientations(uv, F) <= 0)
 
 
-def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+def orientations(uv: Complex, F: Indices) -> NDArray[np.int8]:
     """Return the exact sign of each triangle's image area: 1, 0 or -1, shape (m,).
 
     Exact for the given doubles: if rounding could hide the sign, integer arithmetic decides. A
@@ -50,7 +50,7 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     return in_blocks(lambda some: _orientations(uv, some), F)
 
 
-def _orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+def _orientations(uv: Complex, F: Indices) -> NDArray[np.int8]:
     a, b, c = (uv.take(F[:, k]) for k in range(3))
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         p, q = b - a, c - a
@@ -204,7 +204,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
     return covered, float((np.maximum(layers - 1, 0) * areas).sum())
 
 
-def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int64]:
+def windings(points: Complex, starts: Complex, ends: Complex) -> Indices:
     """Return the winding numbers of closed curves around points (k,).
 
     The curves are given by their sides, from `starts` to `ends` (b,); no point lies on a side.

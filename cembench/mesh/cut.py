@@ -26,9 +26,8 @@ from pathlib import Path
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Complex, Indices, Mask, Points
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
@@ -221,7 +220,7 @@ def read_seams(path: Path) -> list[list[int]]:
         ) from None
 
 
-def edges_of_uv_seams(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> Indices:
+def edges_of_uv_seams(mesh: TriangleMesh, uv: Complex) -> Indices:
     """Return the edges (k, 2) at which texture coordinates of the corners (m, 3) differ."""
     net = _Net.of(mesh)
     (s, c), (t, d) = (np.divmod(half_edges, 3) for half_edges in net.pairs.T)
@@ -249,7 +248,7 @@ class _Net:
     edge: Indices  #: (3m,), the edge of each half-edge
     pairs: Indices  #: (interior edges, 2), their half-edges
     lengths: Points  #: (e,)
-    rim: NDArray[np.bool_]  #: (e,), whether an edge is on the boundary
+    rim: Mask  #: (e,), whether an edge is on the boundary
     loops: tuple[Indices, ...]
 
     @classmethod
@@ -331,7 +330,7 @@ class _Net:
         weights = np.where(self.rim, 1e-9 * self.lengths.mean(), self.lengths)
         return _graph(self.edges, weights, self.n)
 
-    def _cotree(self, away: Points, in_tree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _cotree(self, away: Points, in_tree: Mask) -> Mask:
         """Return the edges that a spanning tree of the triangles crosses, farthest first."""
         number = self.edge[self.pairs[:, 0]]
         loop_length = away[self.edges[number]].sum(axis=1) + self.lengths[number]

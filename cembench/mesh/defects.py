@@ -483,7 +483,7 @@ def components(F: Indices, n: int) -> Problem | None:
     )
 
 
-def some(indices: NDArray[np.int64], most: int = 5) -> str:
+def some(indices: Indices, most: int = 5) -> str:
     """Format the first few of many indices for a message."""
     shown = ", ".join(str(k) for k in indices[:most].tolist())
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")

@@ -12,9 +12,9 @@ from enum import StrEnum
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Indices, Mask, Points
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -423,7 +423,7 @@ def _repair_degenerate(
     return F[keep], face[keep]
 
 
-def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
+def _repeats_a_vertex(F: Indices) -> Mask:
     """Whether each triangle has a vertex twice."""
     return np.asarray((np.roll(F, 1, axis=1) == F).any(axis=1))
 
@@ -548,7 +548,7 @@ def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indice
     return glue(F, pairs[agree], n)
 
 
-def _agreeing(F: Indices) -> tuple[Indices, NDArray[np.bool_]]:
+def _agreeing(F: Indices) -> tuple[Indices, Mask]:
     """Return the pairs of half-edges (k, 2), and whether the two triangles of each agree."""
     _, edge, faces = edges_of_half_edges(F)
     pairs = paired_half_edges(edge, faces)
@@ -604,7 +604,7 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
     return [by_piece[k] for k in order]
 
 
-def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.bool_]:
+def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> Mask:
     """Whether each triangle stays when ears, with two sides on the boundary, are dropped.
 
     Those of holes fold in a map to a disk with round holes. Those of the outer boundary, the widest
@@ -625,7 +625,7 @@ def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.b
     return keep
 
 
-def _ears(F: Indices) -> NDArray[np.bool_]:
+def _ears(F: Indices) -> Mask:
     """Whether each triangle has two sides or three on the boundary."""
     _, edge, faces = edges_of_half_edges(F)
     return np.asarray((faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2)

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from cembench.core.arrays import Complex
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
@@ -124,7 +125,7 @@ class Launcher:
         """Return the judgement of a map, by a process that never imported its algorithm."""
         return self.run(task, what, max(self.options.timeout, JUDGE_SECONDS), **more)
 
-    def read_uv(self, task: Task) -> NDArray[np.complex128] | None:
+    def read_uv(self, task: Task) -> Complex | None:
         """Return the map that the last process left, if any; raise ValueError if it is no map."""
         if not self.uv_file.exists():
             return None

@@ -25,9 +25,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arrays import Complex
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
@@ -87,9 +85,7 @@ def run_tasks(
     return [recorder.records[task.cell.label] for task in tasks]
 
 
-def map_once(
-    task: Task, options: Options | None = None
-) -> tuple[Record, NDArray[np.complex128] | None]:
+def map_once(task: Task, options: Options | None = None) -> tuple[Record, Complex | None]:
     """Call once in a process of its own, without warm-up, and keep nothing on disk.
 
     The map is given if it has the right shape and is finite.
@@ -198,9 +194,7 @@ class _Run:
         finally:
             self.watcher.ends(task, step, monotonic() - since)
 
-    def _save_check(
-        self, state: CellState, outcome: Outcome, uv: NDArray[np.complex128] | None
-    ) -> None:
+    def _save_check(self, state: CellState, outcome: Outcome, uv: Complex | None) -> None:
         state.samples.save_check(outcome, uv)
         state.check = outcome
         self._resume_after_check(state)

@@ -16,7 +16,6 @@ from statistics import median_low
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from cembench.conformal.atlas import atlas_metrics
@@ -305,7 +304,7 @@ def _warnings_ignored() -> Iterator[None]:
         yield
 
 
-def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
+def _boundaries(mesh: TriangleMesh, uv: Complex) -> tuple[Boundary, ...]:
     circles = boundary_circles(mesh, uv) if len(mesh.loops) > 1 else ()
     if not all(np.isfinite(circle.centre) for circle in circles):
         return ()

@@ -18,8 +18,8 @@ from time import monotonic
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.names import file_name
 from cembench.results.records import Fault, FaultKind, Outcome, Round, Status, not_ok
 from cembench.running.estimate import expected_bytes
@@ -114,7 +114,7 @@ class CellTimer:
         """End the server from which processes are forked; the next process gets a new one."""
         self.launcher.close()
 
-    def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
+    def check(self, task: Task) -> tuple[Outcome, Complex | None]:
         """Return the outcome of one call, and its map if it is finite and of the right shape.
 
         A large surface that needs more than the memory limit by estimate is not tried.
@@ -255,12 +255,12 @@ class CellTimer:
         )
         return answer.judged or answer.outcome or unreadable("its maps could not be judged")
 
-    def _map_of_call(self, task: Task, timed: TimedPart, number: int) -> NDArray[np.complex128]:
+    def _map_of_call(self, task: Task, timed: TimedPart, number: int) -> Complex:
         """Return the map of a call in the surface's own order."""
         rows = np.lib.format.open_memmap(self.launcher.uv_file, mode="r")
         return in_first_order(np.array(rows[number]), task.mesh, timed.motions[number])
 
-    def _again(self, task: Task, motion: str) -> NDArray[np.complex128] | Outcome:
+    def _again(self, task: Task, motion: str) -> Complex | Outcome:
         """Return a sample of the map that a new process makes of the surface in this motion."""
         file = self.launcher.uv_file
         maps = file.with_name("maps.npy")
@@ -298,7 +298,7 @@ class CellTimer:
         fault = kept_from_call_to_call(judged.apart, history.scatter)
         return () if fault is None else (fault,)
 
-    def _remember(self, task: Task, motion: str, uv: NDArray[np.complex128]) -> None:
+    def _remember(self, task: Task, motion: str, uv: Complex) -> None:
         """Store a sample of the map of this motion for the next process of the cell."""
         file = self.launcher.scratch / f"{file_name(task.cell.label)}.npy"
         save_array(file, sample(uv))

@@ -16,9 +16,9 @@ from time import monotonic
 from typing import Literal, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -191,7 +191,7 @@ def _time(job: Job) -> Answer:
     return Answer(parts=tuple(parts), used=used)
 
 
-def _maps(timed: TimedCalls) -> NDArray[np.complex128]:
+def _maps(timed: TimedCalls) -> Complex:
     return np.stack([call.uv for call in timed.calls if not isinstance(call.uv, Fault)])
 
 

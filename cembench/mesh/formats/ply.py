@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.core.errors import MeshError
 from cembench.mesh.soup import (
     Soup,
@@ -263,7 +264,7 @@ def _repeated(names: list[str]) -> list[str]:
     return [name for name, count in Counter(names).items() if count > 1]
 
 
-def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
+def _numbers(body: Bytes, header_lines: int) -> Real:
     """Return the numbers of a text in order."""
     numbers = numbers_of(body.tobytes())
     if numbers is not None:
@@ -342,7 +343,7 @@ def _counts(elements: list[_Element]) -> str:
 class _Column:
     """A property in all rows: the number of items of each row, and the items concatenated."""
 
-    sizes: NDArray[np.int64]
+    sizes: Indices
     items: NDArray[Any]
 
 
@@ -438,7 +439,7 @@ def _ends_within(element: _Element, row: int) -> MeshError:
     )
 
 
-def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+def _whole(indices: NDArray[Any]) -> Indices:
     """Return indices as integers; whole numbers in floating point are accepted."""
     if indices.dtype.kind != "f":
         return indices.astype(np.int64)

@@ -6,9 +6,9 @@ import stat
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.planar import fitted_circle, polygon_area
+from cembench.core.arrays import Complex
 from cembench.core.errors import CembenchError, MeshError
 from cembench.core.parameterization import Atlas, Parameterization
 from cembench.mesh.files import write_mesh
@@ -105,7 +105,7 @@ def _check_output(path: Path, mesh: TriangleMesh) -> None:
         raise ProgramFault(FaultKind.OUTPUT_TOO_LARGE, message)
 
 
-def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+def _of_vertices(corners: Complex, mesh: TriangleMesh) -> Complex:
     """Return the UV of each vertex (n,); raise if its corners have different ones."""
     uv = np.empty(mesh.n, dtype=np.complex128)
     uv[mesh.F] = corners
@@ -120,7 +120,7 @@ def _of_vertices(corners: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray
     return uv
 
 
-def _in_unit_circle(uv: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+def _in_unit_circle(uv: Complex, mesh: TriangleMesh) -> Complex:
     """Return an image shifted and scaled to fit its outer boundary to the unit circle."""
     if not (mesh.loops and np.isfinite(uv).all()):
         return uv
