@@ -71,8 +71,7 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
             f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
             "surface with a free boundary"
         )
-    image: Complex = np.exp(-modulus * u + 1j * v)
-    return image
+    return np.exp(-modulus * u + 1j * v)
 
 
 def _rims(pair: ConjugateFunctions, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:

@@ -164,8 +164,7 @@ class BorderedLaplacian:
         All of them, or those in some rows.
         """
         # Constants are harmonic: so the last vertex can be taken to 0 and back.
-        inside: Complex = self._whole.extended((f - f[-1])[:-1], rows) + f[-1]
-        return inside
+        return self._whole.extended((f - f[-1])[:-1], rows) + f[-1]
 
     def _needs_all_inside(self, what: str) -> None:
         """Refuse what would take the other interior for all of it."""

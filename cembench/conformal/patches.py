@@ -68,8 +68,7 @@ def fan_patch(rim: Real) -> Real:
         weights = np.ones_like(weights)
     L = laplacian_of_weights(F, weights, k + 1).toarray()
     spokes = L[:k, k]
-    P: Real = L[:k, :k] - np.outer(spokes, spokes) / L[k, k]
-    return P
+    return L[:k, :k] - np.outer(spokes, spokes) / L[k, k]
 
 
 def disk_patch(angles: Real) -> Real:
@@ -87,8 +86,7 @@ def disk_patch(angles: Real) -> Real:
     slopes = arcs / np.outer(lengths, lengths)
     # u' is (u_next - u) / length on each arc: differences of rows and of columns.
     rows = np.roll(slopes, 1, axis=0) - slopes
-    P: Real = np.roll(rows, 1, axis=1) - rows
-    return P
+    return np.roll(rows, 1, axis=1) - rows
 
 
 def sum_of_cosines(x: Real) -> Real:
@@ -104,8 +102,7 @@ def sum_of_cosines(x: Real) -> Real:
     for term in _coefficients()[::-1]:
         rest = (rest + term) * squared
     log = np.log(np.where(x > 0, x, 1.0))
-    total: Real = squared * (log / 2 - 0.75 - rest)
-    return total
+    return squared * (log / 2 - 0.75 - rest)
 
 
 @cache
@@ -114,5 +111,4 @@ def _coefficients() -> Real:
     from scipy.special import bernoulli, factorial
 
     k = np.arange(1, _TERMS + 1)
-    numbers: Real = np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))
-    return numbers
+    return np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))

@@ -227,8 +227,7 @@ def edges_of_uv_seams(mesh: TriangleMesh, uv: Complex) -> Indices:
     ends = uv[s, c] - uv[t, (d + 1) % 3], uv[s, (c + 1) % 3] - uv[t, d]
     slack = 1e-6 * float(np.abs(uv - uv.mean()).max())
     apart = np.maximum(*map(np.abs, ends)) > slack
-    edges: Indices = net.edges[net.edge[net.pairs[apart, 0]]]
-    return edges
+    return net.edges[net.edge[net.pairs[apart, 0]]]
 
 
 def write_numbers(path: Path, what: str, original: Indices) -> None:
@@ -271,8 +270,7 @@ class _Net:
 
     def numbers(self, path: Indices) -> list[int]:
         """Return the edges between successive vertices of a path."""
-        edges: list[int] = self._between(path[:-1], path[1:]).tolist()
-        return edges
+        return self._between(path[:-1], path[1:]).tolist()
 
     def roots(self, points: list[int]) -> list[int]:
         """Return the vertices at which trees of shortest paths may start."""

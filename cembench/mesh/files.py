@@ -266,8 +266,7 @@ def read_mesh(
     """
     soup = read_soup(path, arrays=arrays, polygons=polygons)
     kinds: Any = (DiskMesh, HoledMesh) if mesh_type is None else (mesh_type,)
-    mesh: M = most_special(soup, kinds, Path(path))
-    return mesh
+    return most_special(soup, kinds, Path(path))
 
 
 def most_special(soup: Soup, kinds: Sequence[type[M]], path: Path | None = None) -> M:

@@ -23,8 +23,7 @@ def side_lengths(V: Real, F: Indices) -> Real:
         In the unit of V. Side c runs from corner c + 1 to corner c + 2 (modulo 3).
 
     """
-    lengths: Real = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
-    return lengths
+    return np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
 
 
 def loop_width(loop: Real) -> float:

@@ -170,8 +170,7 @@ def _serve() -> dict[str, str]:
             continue
         child, code = os.fork(), None
         if not child:
-            order: dict[str, str] = request
-            return order
+            return request
         with suppress(OSError):  # already done by the child, or the child has ended
             os.setpgid(child, child)
         _say(number, child)

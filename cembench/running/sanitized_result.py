@@ -203,8 +203,7 @@ def _extras(value: Any) -> dict[str, Any]:
         raise _WrongReportError(f"cannot be written as JSON: {describe_error(error)}") from None
     if len(text) > MOST_EXTRAS_BYTES:
         raise _WrongReportError(f"takes {len(text):,} bytes; allowed are {MOST_EXTRAS_BYTES:,}")
-    plain: dict[str, Any] = json.loads(text)
-    return plain
+    return json.loads(text)
 
 
 def _type_of(value: Any) -> str:

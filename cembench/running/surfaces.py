@@ -163,8 +163,7 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
     """Generate a registered surface with about `faces` triangles, or at its own size."""
     family = registry.surface(name)
     sizes = {} if faces is None else {"faces": faces}
-    mesh: TriangleMesh = family.function(**family.arguments(sizes))
-    return mesh
+    return family.function(**family.arguments(sizes))
 
 
 def file_named(path: Path, registry: Registry) -> Path:
