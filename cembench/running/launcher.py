@@ -14,7 +14,7 @@ import shutil
 import sys
 import threading
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -41,32 +41,25 @@ JUDGE_SECONDS = 600.0
 LARGEST_ANSWER_BYTES = 2**24
 
 
+@dataclass(eq=False)
 class Launcher:
     """Starts processes, one at a time.
 
-    `scratch` is the folder for exchanging files with them. They are forked where `forks` allows it
-    and the system can; the server ends with :meth:`close`, and the next process gets a new one.
-    `number` is that of the server for judges: launchers that run in parallel have different ones.
-    `stopped` may be shared by launchers that are stopped together.
+    They are forked where `forks` allows it and the system can; the server ends with :meth:`close`,
+    and the next process gets a new one.
     """
 
-    def __init__(
-        self,
-        scratch: Path,
-        options: Options,
-        *,
-        forks: bool = True,
-        number: int = 0,
-        stopped: threading.Event | None = None,
-    ) -> None:
-        self.scratch = scratch
-        self.options = options
-        self.forks = forks
-        self.number = number
-        self.stopped = stopped or threading.Event()
-        self._server: ForkServer | None = None
-        #: Status of the mesh files when they were written.
-        self._written: dict[Path, tuple[int, ...]] = {}
+    #: The folder for exchanging files with processes.
+    scratch: Path
+    options: Options
+    forks: bool = True
+    #: That of the server for judges: launchers that run in parallel have different ones.
+    number: int = 0
+    #: Shared by launchers that are stopped together.
+    stopped: threading.Event = field(default_factory=threading.Event)
+    _server: ForkServer | None = None
+    #: Status of the mesh files when they were written.
+    _written: dict[Path, tuple[int, ...]] = field(default_factory=dict)
 
     def close(self) -> None:
         """End the server, if there is one."""

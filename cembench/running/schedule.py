@@ -295,10 +295,7 @@ def cheapest(
 
 
 def _within(
-    ordered: Sequence[str],
-    costs: Mapping[str, float],
-    partners: Mapping[str, str],
-    seconds: float,
+    ordered: Sequence[str], costs: Mapping[str, float], partners: Mapping[str, str], seconds: float
 ) -> set[str]:
     """Return the cells that can be paid for, in this order, each with its partner."""
     chosen: set[str] = set()

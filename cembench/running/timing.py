@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 from os import urandom
 from pathlib import Path
 from time import monotonic
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
 
@@ -80,7 +80,7 @@ class CellTimer:
         forks: bool = True,
         stopped: threading.Event | None = None,
     ) -> None:
-        self.launcher = Launcher(scratch, options, forks=forks, stopped=stopped)
+        self.launcher = Launcher(scratch, options, forks, stopped=stopped or threading.Event())
         self._cells: dict[str, _History] = {}
         self._numbering = urandom(6).hex()
 
@@ -96,13 +96,8 @@ class CellTimer:
         for number in range(1, jobs + 1):
             judges_server(number)
             timer = copy(self)
-            timer.launcher = Launcher(
-                own.scratch / f"checks-{number}",
-                options,
-                forks=own.forks,
-                number=number,
-                stopped=own.stopped,
-            )
+            scratch = own.scratch / f"checks-{number}"
+            timer.launcher = Launcher(scratch, options, own.forks, number, own.stopped)
             timers.append(timer)
         return timers
 
@@ -177,9 +172,8 @@ class CellTimer:
             judged = self._judge(task, known, timed)
             if isinstance(judged, Outcome):
                 return judged
-            about: dict[str, Any] = {"motions": "; ".join(timed.motions)}
-            about |= {"repeated": judged.repeated, "energy": judged.energy}
-            about |= {"differs": judged.differs}
+            about = judged.model_dump(include={"repeated", "energy", "differs"})
+            about["motions"] = "; ".join(timed.motions)
             judged_rounds.append(timed.round.model_copy(update=about))
         return judged_rounds
 
@@ -238,7 +232,9 @@ class CellTimer:
             status: Status = "invalid" if judged.faults else "not_comparable"
             return not_ok(status, *judged.faults, *stored)
         # Of a cell's first process the call whose surface kept its numbers, else any timed one.
-        number = 1 if SECOND_CALL in timed.names else _any_timed(timed)
+        first = int(timed.names[0] == WARM_UP)
+        number = random.SystemRandom().randrange(first, len(timed.names))
+        number = 1 if SECOND_CALL in timed.names else number
         self._remember(task, timed.motions[number], self._map_of_call(task, timed, number))
         return judged
 
@@ -310,10 +306,6 @@ def _as_asked(timed: TimedPart, part: Part) -> bool:
     told = timed.motions
     every = len(told) == len(timed.names) == len(set(told))
     return every and len(told) <= len(part.motions) and all(map(may_be, told, part.motions))
-
-
-def _any_timed(timed: TimedPart) -> int:
-    return random.SystemRandom().randrange(int(timed.names[0] == WARM_UP), len(timed.names))
 
 
 def _too_large(faces: int, expected: float, limit: int) -> Fault:
