@@ -173,26 +173,7 @@ def collapse(
     b = bound[ends]
     one = b[:, 0] != b[:, 1]
     where[one] = V[np.where(b[one, 0], ends[one, 0], ends[one, 1])]
-    # No triangle may be reversed or become a sliver.
-    owner = np.full(n, -1)
-    owner[ends[:, 0]] = owner[ends[:, 1]] = np.arange(len(ends))
-    own = owner[F]
-    touched = np.flatnonzero((own >= 0).sum(axis=1) == 1)
-    T, o = F[touched], own[touched]
-    moved = np.where((o >= 0)[:, :, None], where[o], V[T])
-    before = area_vectors(V, T)
-    after = np.cross(moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0])
-    longest = np.stack(
-        [((moved[:, c] - moved[:, (c + 1) % 3]) ** 2).sum(axis=1) for c in range(3)]
-    ).max(axis=0)
-    size = np.linalg.norm(after, axis=1)
-    cosine = (before * after).sum(axis=1) / np.maximum(
-        np.linalg.norm(before, axis=1) * size, 1e-300
-    )
-    bad = (cosine < 0.3) | (size < 0.02 * longest)
-    spoiled = np.zeros(len(ends), dtype=bool)
-    spoiled[o.max(axis=1)[bad]] = True
-    keep = np.flatnonzero(~spoiled)
+    keep = np.flatnonzero(~_spoil_triangles(V, F, ends, where))
     if most is not None:
         keep = keep[np.argsort(rank[keep])[:most]]
     V = V.copy()
@@ -202,6 +183,27 @@ def collapse(
     F = target[F]
     alive = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     return compact(V, F[alive])
+
+
+def _spoil_triangles(V: Real, F: Indices, ends: Indices, where: Real) -> Mask:
+    """Whether edges (k, 2) that collapse to these points reverse a triangle or make slivers."""
+    owner = np.full(len(V), -1)
+    owner[ends[:, 0]] = owner[ends[:, 1]] = np.arange(len(ends))
+    own = owner[F]
+    touched = np.flatnonzero((own >= 0).sum(axis=1) == 1)
+    T, o = F[touched], own[touched]
+    moved = np.where((o >= 0)[:, :, None], where[o], V[T])
+    before = area_vectors(V, T)
+    after = np.cross(moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0])
+    sides = ((moved - np.roll(moved, -1, axis=1)) ** 2).sum(axis=2)
+    size = np.linalg.norm(after, axis=1)
+    cosine = (before * after).sum(axis=1) / np.maximum(
+        np.linalg.norm(before, axis=1) * size, 1e-300
+    )
+    bad = (cosine < 0.3) | (size < 0.02 * sides.max(axis=1))
+    spoiled = np.zeros(len(ends), dtype=bool)
+    spoiled[o.max(axis=1)[bad]] = True
+    return spoiled
 
 
 def _cotangents(V: Real, p: Indices, i: Indices, j: Indices) -> Real:

@@ -358,14 +358,6 @@ def relative_areas(V: Points, F: Indices) -> Points:
     return shares
 
 
-def _extents(V: Points, F: Indices) -> Points:
-    """Return the largest side of each triangle's bounding box."""
-    extents = np.empty(len(F))
-    for block, corners in _corners(V, F):
-        extents[block] = np.ptp(corners, axis=1).max(axis=0)
-    return extents
-
-
 def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
     """Yield blocks of triangles (k), and their corners (3, 3, k): x, y, z of the three of each.
 
@@ -381,21 +373,19 @@ def out_of_scale(V: Points, F: Indices) -> Problem | None:
     finite = np.abs(V[np.isfinite(V).all(axis=1)])
     largest = finite.max(initial=0)
     if largest > LARGEST_LENGTH:
-        return Problem(
-            Defect.scale,
-            int((finite > LARGEST_LENGTH).any(axis=1).sum()),
-            f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}",
-        )
-    spans = _extents(V, F)
+        text = f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}"
+        return Problem(Defect.scale, int((finite > LARGEST_LENGTH).any(axis=1).sum()), text)
+    spans = np.empty(len(F))  # the largest side of each triangle's bounding box
+    for block, corners in _corners(V, F):
+        spans[block] = np.ptp(corners, axis=1).max(axis=0)
     tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
     if not len(tiny):
         return None
-    return Problem(
-        Defect.scale,
-        len(tiny),
+    text = (
         f"triangle {some(tiny)} (counted from 0) spans less than {SMALLEST_LENGTH:g}, the first "
-        f"{spans[tiny[0]]:.3g}",
+        f"{spans[tiny[0]]:.3g}"
     )
+    return Problem(Defect.scale, len(tiny), text)
 
 
 def duplicates(F: Indices) -> Mask:
@@ -456,13 +446,12 @@ def coincident(V: Points) -> Problem | None:
     if not len(extra):
         return None
     i, j = finite[same[extra[0]]], finite[extra[0]]
-    return Problem(
-        Defect.coincident,
-        len(extra),
-        f"coincident vertices: {len(extra)} vertices have exactly the position of another "
-        f"vertex, the first pair being {i} and {j} (counted from 0); there may be open seams "
-        "that should be closed",
+    text = (
+        f"coincident vertices: {len(extra)} vertices have exactly the position of another vertex, "
+        f"the first pair being {i} and {j} (counted from 0); there may be open seams that should "
+        "be closed"
     )
+    return Problem(Defect.coincident, len(extra), text)
 
 
 def components(F: Indices, n: int) -> Problem | None:
@@ -474,13 +463,12 @@ def components(F: Indices, n: int) -> Problem | None:
         return None
     ends = (vertices.argmax(), pieces[::-1][vertices[pieces[::-1]].argmin()])  # of equal ones, too
     large, small = (np.flatnonzero((label == end) & _used(F, n))[0] for end in ends)
-    return Problem(
-        Defect.components,
-        len(pieces),
+    text = (
         f"the mesh has {len(pieces)} connected components (vertex {large} lies in the largest, "
         f"with {vertices.max()} of {vertices.sum()} vertices, vertex {small} in the smallest); "
-        "this needs exactly one",
+        "this needs exactly one"
     )
+    return Problem(Defect.components, len(pieces), text)
 
 
 def some(indices: Indices, most: int = 5) -> str:

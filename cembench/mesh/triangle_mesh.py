@@ -375,14 +375,13 @@ def _holes(V: Real, loops: Loops) -> Problem:
     sizes = sorted(map(len, loops), reverse=True)
     lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
     longest = int(np.argmax(lengths))
-    return Problem(
-        Defect.holes,
-        len(loops) - 1,
+    edges = max(len(loop) for k, loop in enumerate(loops) if k != longest)
+    text = (
         f"the surface has {len(loops)} boundary loops (of {', '.join(map(str, sizes[:5]))}"
         f"{', ...' if len(loops) > 5 else ''} vertices); this needs a topological disk, with "
-        "exactly one",
-        edges=max(len(loop) for k, loop in enumerate(loops) if k != longest),
+        "exactly one"
     )
+    return Problem(Defect.holes, len(loops) - 1, text, edges)
 
 
 def _handles(F: Indices, n: int, loops: Loops) -> list[Problem]:
