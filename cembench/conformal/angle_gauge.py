@@ -24,9 +24,9 @@ from cembench.mesh.triangle_mesh import DiskMesh
 #: The search begins with moves of the disk's centre by this hyperbolic length ...
 FIRST_MOVE = 0.3
 #: ... ends with moves by this, or where the error changes by this share of itself ...
-LAST_MOVE, LEAST_CHANGE = 0.01, 1e-4
+LAST_MOVE, MIN_CHANGE = 0.01, 1e-4
 #: ... and asks for the error of so many maps at most.
-MOST_MAPS = 100
+MAX_MAPS = 100
 #: Mean angle errors within this share of the least count as equal.
 EQUAL = 0.01
 
@@ -68,7 +68,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
         tried.append((sampled(_moved(mesh, uv, move)), tuple(move.tolist())))
         return tried[-1][0]
 
-    ends = {"xatol": LAST_MOVE, "fatol": LEAST_CHANGE * sampled(uv), "maxfev": MOST_MAPS}
+    ends = {"xatol": LAST_MOVE, "fatol": MIN_CHANGE * sampled(uv), "maxfev": MAX_MAPS}
     options = {"initial_simplex": FIRST_MOVE * np.eye(3)[:, 1:], **ends}
     minimize(error_at, np.zeros(2), method="Nelder-Mead", options=options)
     areas, most = surface_areas(mesh), (1 + EQUAL) * min(tried)[0]

@@ -31,7 +31,7 @@ HEIGHT = 4 * np.finfo(float).eps
 #: Changes of an angle up to this size are ignored.
 MOVED = 1e-14
 #: Largest share of the boundary's arcs that may run backward.
-MOST_BACKWARD = 0.1
+MAX_BACKWARD = 0.1
 #: Numbers of rings of vertices around the folds that are laid out again, in this order.
 RINGS = (1, 2, 4, 8, 16)
 
@@ -158,7 +158,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     ------
     AlgorithmFailed
         The points do not go around the circle once and counter-clockwise, or more than the share
-        `MOST_BACKWARD` of their arcs runs backward.
+        `MAX_BACKWARD` of their arcs runs backward.
 
     """
     arcs = np.angle(np.roll(circle, -1) / circle)
@@ -171,7 +171,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     moved = np.abs(turned) > MOVED
     ordered = np.roll(np.where(moved, cut[0] * np.exp(1j * (angles + turned)), cut), first)
     turns = round(arcs.sum() / (2 * np.pi))
-    scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
+    scrambled = backward_arcs(circle) > MAX_BACKWARD * len(circle)
     if turns != 1:
         raise AlgorithmFailed(
             f"the boundary {winding_words(turns)}; it must go around it once, counter-clockwise, "
@@ -180,7 +180,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     if scrambled or backward_arcs(ordered):
         raise AlgorithmFailed(
             f"{backward_arcs(circle)} of the boundary's {len(circle)} arcs go backward or have no "
-            f"length, more than the share of {MOST_BACKWARD:.0%} whose order can be repaired"
+            f"length, more than the share of {MAX_BACKWARD:.0%} whose order can be repaired"
         )
     return ordered
 

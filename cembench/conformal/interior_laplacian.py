@@ -26,7 +26,7 @@ from cembench.linear_algebra.lower_triangle import permuted_lower
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Shorter boundaries are always kept last: their dense triangle is small, and serves any step.
-LEAST_BOUNDARY = 500
+MIN_BOUNDARY = 500
 #: The boundary's rows of a factor take so many operations, times B^2 sqrt(n): the separators that
 #: they meet have about sqrt(n) vertices.
 ROWS = 4.7
@@ -61,7 +61,7 @@ def solves_pay(interior: int, boundary: int) -> bool:
     False
 
     """
-    if boundary <= LEAST_BOUNDARY or interior < 2 or not keeps_factors():
+    if boundary <= MIN_BOUNDARY or interior < 2 or not keeps_factors():
         return False
     spared = boundary**3 / 3 + ROWS * boundary**2 * math.sqrt(interior)
     one_pass = ENTRIES * interior * math.log2(interior) * OPERATIONS_AN_ENTRY

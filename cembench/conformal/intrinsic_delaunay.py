@@ -21,7 +21,7 @@ ROUNDING = 1e-10
 #: The corner after each one of a triangle, and round again.
 NEXT = np.array([1, 2, 0, 1])
 #: Maximal rounds of flips; a real surface takes about ten.
-MOST_ROUNDS = 1000
+MAX_ROUNDS = 1000
 #: Up to this share of obtuse angles, the edges opposite to them are examined alone first.
 FEW = 0.02
 
@@ -131,7 +131,7 @@ class _Corners:
     def flip_all(self, inside: Mask | None = None) -> bool:
         """Flip until no edge is wrong; False, and not at the end, at a vertex not `inside`."""
         waiting = self.obtuse()
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             wrong = self.not_delaunay(waiting)
             if not len(wrong):
                 break

@@ -37,7 +37,7 @@ from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Share of E_D by which rounding may make E_C negative.
-LEAST_ENERGY = 1e-9
+MIN_ENERGY = 1e-9
 #: Number of triangles that :class:`SampledAngleError` samples.
 SAMPLE = 4_000
 #: Allowed distance from the unit circle of a disk map's boundary, for a common gauge.
@@ -523,7 +523,7 @@ def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
         if not np.isfinite(value)
     ]
     energy, whole = metrics["conformal_energy"], metrics["dirichlet_energy"]
-    if energy < -LEAST_ENERGY * abs(whole):
+    if energy < -MIN_ENERGY * abs(whole):
         lost.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
     return [Notice(NoticeKind.LOST_IN_ROUNDING, text) for text in lost]
 

@@ -17,7 +17,7 @@ UNDERFLOW = 1e-280
 #: Precision of an angle between neighbours on the unit circle, in radians.
 ANGLE_ROUNDING = 4 * float(np.finfo(float).eps)
 #: Most boundary crossings for which an overlap is computed; size of its buffers.
-MOST_CROSSINGS, AT_ONCE = 20_000, 2_000_000
+MAX_CROSSINGS, AT_ONCE = 20_000, 2_000_000
 
 
 def polygon_area(z: Complex) -> float:
@@ -160,7 +160,7 @@ def overlap_share(curves: Sequence[Complex]) -> float:
     The curves are the closed polygons that bound the region, holes clockwise. Without folds, a
     point with winding number w is covered w times, of which w - 1 are too many. The share is the
     area of these over the area of all layers; infinite if the curves cross more than
-    :data:`MOST_CROSSINGS` times or enclose nothing.
+    :data:`MAX_CROSSINGS` times or enclose nothing.
 
     Examples
     --------
@@ -186,7 +186,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
     """Return the area of all layers that closed curves bound, and of the layers above the lowest.
 
     The curves are given by their sides, from `starts` to `ends` (b,), the region to their left.
-    Both are NaN if sides cross more than :data:`MOST_CROSSINGS` times.
+    Both are NaN if sides cross more than :data:`MAX_CROSSINGS` times.
     """
     import shapely
 
@@ -194,7 +194,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
         np.stack([starts.real, ends.real], axis=1), np.stack([starts.imag, ends.imag], axis=1)
     )
     meeting = shapely.STRtree(sides).query(sides, predicate="intersects").shape[1]
-    if (meeting - 3 * len(sides)) / 2 > MOST_CROSSINGS:  # each side meets itself and its neighbours
+    if (meeting - 3 * len(sides)) / 2 > MAX_CROSSINGS:  # each side meets itself and its neighbours
         return float("nan"), float("nan")
     faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(sides)]))
     inside = shapely.point_on_surface(faces)

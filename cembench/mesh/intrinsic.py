@@ -19,9 +19,9 @@ from cembench.mesh.side_lengths import side_lengths
 #: An edge is flipped if the cosines of its opposite angles sum to less than this.
 SURELY = -1e-10
 #: Maximal number of rounds; the edges of a round share no triangle.
-MOST_ROUNDS = 20_000
+MAX_ROUNDS = 20_000
 #: Small meshes of needles flip for ever, since their angles have no digits: they get fewer.
-LEAST_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
+MIN_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Triangulation:
         h = np.arange(len(self.twin)) if among is None else among
         h = h[h < self.twin[h]]
         sums = self._cosine(h, u) + self._cosine(self.twin[h], u)
-        most = min(MOST_ROUNDS, LEAST_ROUNDS + ROUNDS_AN_EDGE * len(self.twin) // 2)
+        most = min(MAX_ROUNDS, MIN_ROUNDS + ROUNDS_AN_EDGE * len(self.twin) // 2)
         moved = np.arange(len(self.twin))
         for _ in range(most):
             bad = (sums < SURELY) & (h // 3 != self.twin[h] // 3)

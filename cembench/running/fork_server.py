@@ -31,7 +31,7 @@ from cembench.running.processor import children, keep_orphans
 #: Placeholder in the server's environment, as long as the mark that a forked process writes there.
 _NO_MARK = "0" * 32
 #: Seconds within which what a process left is ended; what starts processes faster stays.
-_MOST_SECONDS = 5.0
+_MAX_SECONDS = 5.0
 
 
 class ServerGoneError(Exception):
@@ -182,7 +182,7 @@ def _end_children() -> None:
 
     One may have left its group, its environment and its limits, and be a new process every moment.
     """
-    until = monotonic() + _MOST_SECONDS
+    until = monotonic() + _MAX_SECONDS
     with suppress(ChildProcessError):  # none is left
         while monotonic() < until:
             while os.waitpid(-1, os.WNOHANG)[0]:

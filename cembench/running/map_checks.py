@@ -50,7 +50,7 @@ SCATTER = 10.0
 #: How many times that of the check the E_C of the timed maps may be; the check's counts as this
 #: share of the area at least. Where symmetry or the numbering decides, as for LDM, it is up to five
 #: times that in a call.
-FAR_WORSE, LEAST_ENERGY = 10.0, 1e-4
+FAR_WORSE, MIN_ENERGY = 10.0, 1e-4
 #: Names of first calls that are not timed: the first warms up, a second is for comparison only.
 WARM_UP, SECOND_CALL = "the warm-up", "the second call"
 #: Maximum number of entries of a map that are kept for comparisons.
@@ -251,7 +251,7 @@ def _other_energy(energy: float, checked: float) -> list[Fault]:
 
 def _far_worse(energy: float | None, checked: float | None) -> tuple[Fault, ...]:
     """Return the fault that timed maps are far worse than the check's, if they are."""
-    if energy is None or checked is None or energy <= FAR_WORSE * max(checked, LEAST_ENERGY):
+    if energy is None or checked is None or energy <= FAR_WORSE * max(checked, MIN_ENERGY):
         return ()
     message = (
         f"E_C over the area of the timed maps is {energy:.3g}, of the checked one {checked:.3g}: "

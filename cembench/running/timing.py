@@ -49,7 +49,7 @@ from cembench.running.timing_checks import impossible, incomparable
 from cembench.running.worker import Part, TimedPart
 
 #: Number of new processes that are asked, at most, how far maps of a randomised solver scatter.
-_MOST_ASKED = 3
+_MAX_ASKED = 3
 
 
 @dataclass
@@ -281,7 +281,7 @@ class CellTimer:
         if motion == UNMOVED:  # the check was a new process too
             history.scatter = judged.apart
             return ()
-        for _ in range(_MOST_ASKED):
+        for _ in range(_MAX_ASKED):
             if kept_from_call_to_call(judged.apart, history.scatter) is None:
                 return ()
             again = self._again(task, motion)

@@ -40,7 +40,7 @@ from cembench.running.recorder import Recorder, now, record_of, recording
 from cembench.running.watcher import Step, Watcher
 
 #: Number of lost workers after which a unit is recorded as failed.
-MOST_LOST = 2
+MAX_LOST = 2
 #: Seconds between two looks at the connected workers.
 LOOK_EVERY = 1.0
 #: Seconds for the records of a unit to arrive.
@@ -265,7 +265,7 @@ class _ClusterRun:
         with suppress(Exception):
             self.client.cancel([job.future], force=True)
         job.lost += 1
-        if job.lost >= MOST_LOST:
+        if job.lost >= MAX_LOST:
             self._give_up(worker, job)
             return
         worker.job = None
