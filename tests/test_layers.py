@@ -73,9 +73,9 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
     "core": 2_050,
-    "mesh": 6_880,
+    "mesh": 6_820,
     "linear_algebra": 1_550,
-    "conformal": 6_690,
+    "conformal": 6_650,
     "registry": 960,
     "results": 5_000,
     "running": 7_910,

@@ -29,7 +29,7 @@ from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import array_of, check_finite, located, representatives
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
-from cembench.mesh.formats.apart import apart
+from cembench.mesh.formats.isolated import isolated
 from cembench.mesh.repair import Repaired, repair
 from cembench.mesh.soup import Soup, Texture, complex_of
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -41,19 +41,19 @@ READERS: dict[str, Callable[..., Soup]] = {
     ".off": off.read,
     ".ply": ply.read,
     ".stl": stl.read,
-    ".mat": apart(mat.read, Extra.FORMATS, "scipy"),
+    ".mat": isolated(mat.read, Extra.FORMATS, "scipy"),
     ".npz": npz.read,
-    ".vtk": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
-    ".vtu": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
-    ".vtp": apart(vtk.read, Extra.VTP, "vtk"),
-    ".vts": apart(vtk.read, Extra.VTP, "vtk"),
-    ".glb": apart(gltf.read, Extra.FORMATS, "trimesh"),
-    ".gltf": apart(gltf.read, Extra.FORMATS, "trimesh"),
-    ".gii": apart(gii.read, Extra.FORMATS, "nibabel"),
+    ".vtk": isolated(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtu": isolated(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtp": isolated(vtk.read, Extra.VTP, "vtk"),
+    ".vts": isolated(vtk.read, Extra.VTP, "vtk"),
+    ".glb": isolated(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gltf": isolated(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gii": isolated(gii.read, Extra.FORMATS, "nibabel"),
 }
 #: How FreeSurfer geometry begins, whose file names have endings of any kind, and FreeSurfer values.
 _FREESURFER, _VALUES = (b"\xff\xff\xfe", b"\xff\xff\xfd"), b"\xff\xff\xff"
-_read_freesurfer = apart(gii.read_freesurfer, Extra.FORMATS, "nibabel")
+_read_freesurfer = isolated(gii.read_freesurfer, Extra.FORMATS, "nibabel")
 #: Files of other kinds, by the end of their names, and how a surface is made of them.
 _NO_SURFACES = {
     (".nii", ".nii.gz", ".mgz", ".mgh"): (
@@ -166,9 +166,9 @@ def read_soup(
 def _library_reader(suffix: str) -> Callable[..., Soup] | None:
     """Return the reader of a format that only an installed library knows, or None."""
     if suffix in (".3mf", ".dae") and find_spec("trimesh"):
-        return apart(gltf.read, Extra.FORMATS, "trimesh")
+        return isolated(gltf.read, Extra.FORMATS, "trimesh")
     if suffix in (".msh", ".mesh", ".inp") and find_spec("meshio"):
-        return apart(vtk.read_by_meshio, Extra.FORMATS, "meshio")
+        return isolated(vtk.read_by_meshio, Extra.FORMATS, "meshio")
     return None
 
 

@@ -133,7 +133,7 @@ def partners_of(cells: Sequence[Cell], reference: str) -> dict[str, str]:
     }
 
 
-def look(
+def interim_check(
     cells: Sequence[CellState], number: int, options: Options, seconds_left: float
 ) -> tuple[list[tuple[CellState, Ended]], list[CellState]]:
     """Return the cells that end after `number` rounds, with the reason, and those that continue.

@@ -276,13 +276,13 @@ class CellTimer:
         Where the maps of both processes differ, new ones are asked how far theirs do.
         """
         history, motion = self._history(task), timed.motions[0]
-        if judged.apart is None or judged.faults or task.algorithm.program is not None:
+        if judged.difference is None or judged.faults or task.algorithm.program is not None:
             return ()
         if motion == UNMOVED:  # the check was a new process too
-            history.scatter = judged.apart
+            history.scatter = judged.difference
             return ()
         for _ in range(_MAX_ASKED):
-            if kept_from_call_to_call(judged.apart, history.scatter) is None:
+            if kept_from_call_to_call(judged.difference, history.scatter) is None:
                 return ()
             again = self._again(task, motion)
             if isinstance(again, Outcome):
@@ -291,7 +291,7 @@ class CellTimer:
             history.scatter = max(scatter, history.scatter)
             if scatter <= SAME_MAP:
                 break
-        fault = kept_from_call_to_call(judged.apart, history.scatter)
+        fault = kept_from_call_to_call(judged.difference, history.scatter)
         return () if fault is None else (fault,)
 
     def _remember(self, task: Task, motion: str, uv: Complex) -> None:

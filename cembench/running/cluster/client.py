@@ -42,7 +42,7 @@ from cembench.running.watcher import Step, Watcher
 #: Number of lost workers after which a unit is recorded as failed.
 MAX_LOST = 2
 #: Seconds between two looks at the connected workers.
-LOOK_EVERY = 1.0
+POLL_SECONDS = 1.0
 #: Seconds for the records of a unit to arrive.
 ARRIVES_WITHIN = 600.0
 #: Seconds without any worker after which a run on this machine's own workers ends: dask restarts
@@ -160,9 +160,9 @@ class _ClusterRun:
                 if self.waiting and not worker.job and not refused:
                     self._send(worker, self.waiting.pop())
             with suppress(Empty):
-                event = self.events.get(timeout=LOOK_EVERY)
+                event = self.events.get(timeout=POLL_SECONDS)
                 self._report(event) if isinstance(event, Mapping) else self._end(*event)
-            if monotonic() - self.looked > LOOK_EVERY:
+            if monotonic() - self.looked > POLL_SECONDS:
                 self._look()
         self._save_state()
 
