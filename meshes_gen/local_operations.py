@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from cembench.core.arrays import Indices, Mask, Real
+from cembench.core.arrays import Indices, Mask, Real, marked
 
 
 @dataclass(frozen=True)
@@ -33,9 +33,7 @@ class Edges:
 
     def rim(self, n: int) -> Mask:
         """Return whether each of the n vertices is on the boundary."""
-        mask = np.zeros(n, dtype=bool)
-        mask[self.ends[self.on_boundary]] = True
-        return mask
+        return marked(n, self.ends[self.on_boundary])
 
 
 def edges_of(F: Indices, n: int) -> Edges:
@@ -66,8 +64,7 @@ def boundary_mask(F: Indices, n: int) -> Mask:
 
 def compact(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Return the same mesh without unused vertices."""
-    used = np.zeros(len(V), dtype=bool)
-    used[F] = True
+    used = marked(len(V), F)
     return V[used], (np.cumsum(used) - 1)[F]
 
 
@@ -201,9 +198,7 @@ def _spoil_triangles(V: Real, F: Indices, ends: Indices, where: Real) -> Mask:
         np.linalg.norm(before, axis=1) * size, 1e-300
     )
     bad = (cosine < 0.3) | (size < 0.02 * sides.max(axis=1))
-    spoiled = np.zeros(len(ends), dtype=bool)
-    spoiled[o.max(axis=1)[bad]] = True
-    return spoiled
+    return marked(len(ends), o.max(axis=1)[bad])
 
 
 def _cotangents(V: Real, p: Indices, i: Indices, j: Indices) -> Real:
@@ -304,8 +299,7 @@ def delaunay_flips(V: Real, F: Indices, rounds: int = 40) -> Indices:
             break
         F = F.copy()
         F[active] = part
-        near = np.zeros(n, dtype=bool)
-        near[F[active[changed]]] = True
+        near = marked(n, F[active[changed]])
         for _ in range(2):
             near[F[near[F].any(axis=1)]] = True
         active = np.flatnonzero(near[F].any(axis=1))

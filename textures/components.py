@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Real, numbered
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
 from cembench.mesh.files import read_soup
@@ -130,8 +130,7 @@ def read_shells(
             ) from None
     parts = []
     for k, (own, held) in enumerate(pieces):
-        number = np.full(len(soup.V), -1)
-        number[own] = np.arange(len(own))
+        number = numbered(len(soup.V), own)
         name = f"{soup.name} {k + 1}"
         F = number[soup.triangles[held]]
         shell = Soup.of_triangles(soup.V[own], F, name=name, notices=soup.notices)

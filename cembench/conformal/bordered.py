@@ -15,7 +15,7 @@ from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.planar import polygon_area
 from cembench.conformal.ring_order import ring_pays
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky, shows_trailing_block
@@ -98,8 +98,7 @@ class BorderedLaplacian:
         too_long = len(self.boundary) > LARGEST_DENSE
         if not iterations or too_long or not shows_trailing_block():
             return self.interior, False
-        near = np.zeros(L.shape[0], dtype=bool)
-        near[by_rows(L)[self.boundary].indices] = True
+        near = marked(L.shape[0], by_rows(L)[self.boundary].indices)
         near[self.boundary] = False
         ring = np.flatnonzero(near)
         sizes = len(self.interior), len(ring), len(self.boundary)

@@ -16,7 +16,7 @@ import scipy
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.planar import backward_arcs, folded_triangles, winding_words
 from cembench.conformal.untangling import untangled
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Real, marked, numbered
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.topology import vertex_graph
@@ -100,15 +100,13 @@ def interior_without_folds(
         return z, 0
     rounds = 0
     with phase("folds"):
-        held = np.zeros(mesh.n, dtype=bool)
-        held[np.concatenate(mesh.loops)] = True
+        held = marked(mesh.n, np.concatenate(mesh.loops))
         graph = vertex_graph(mesh.F, mesh.n)
         for count in rings:
             folded = folded[~held[mesh.F[folded]].all(axis=1)]
             if not len(folded):
                 break
-            near = np.zeros(mesh.n, dtype=bool)
-            near[mesh.F[folded]] = True
+            near = marked(mesh.n, mesh.F[folded])
             for _ in range(count):
                 near |= graph @ near.astype(np.float64) > 0
             z = _accepted(mesh, z, *untangled(mesh, z, near & ~held, graph))
@@ -135,8 +133,7 @@ def _folded(mesh: TriangleMesh, z: Complex) -> Indices:
 def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
     """Return the boundary in order, such that no triangle between its vertices has zero area."""
     ordered = in_order(circle)
-    place = np.full(mesh.n, -1)
-    place[mesh.boundary] = np.arange(len(circle))
+    place = numbered(mesh.n, mesh.boundary)
     corners = place[mesh.F]
     corners = corners[(corners >= 0).all(axis=1)]
     flat = corners[folded_triangles(ordered, corners)]

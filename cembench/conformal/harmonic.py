@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import by_rows
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
@@ -98,8 +98,7 @@ class HarmonicExtension:
 
     def __init__(self, L: scipy.sparse.csc_array, fixed: Indices) -> None:
         self._L, self._fixed = L, fixed
-        free = np.ones(L.shape[0], dtype=bool)
-        free[fixed] = False
+        free = ~marked(L.shape[0], fixed)
         self._free = np.flatnonzero(free)
 
     @cached_property

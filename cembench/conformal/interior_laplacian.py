@@ -19,7 +19,7 @@ from cembench.conformal.boundary_modes import InverseByModes
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.ring_order import ENTRIES, OPERATIONS_AN_ENTRY
-from cembench.core.arrays import Complex, Indices, Mask, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real, marked
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky, keeps_factors
 from cembench.linear_algebra.lower_triangle import permuted_lower
@@ -168,8 +168,7 @@ def _sparse_columns(inside: Real, L_bi: scipy.sparse.csr_array) -> tuple[Mask, M
     These rows are the boundary's neighbours and those of the columns with few entries, fewer than
     there are neighbours.
     """
-    wanted = np.zeros(len(inside), dtype=bool)
-    wanted[L_bi.indices] = True
+    wanted = marked(len(inside), L_bi.indices)
     entries = np.count_nonzero(inside, axis=0)
     few = (entries > 0) & (entries <= np.count_nonzero(wanted))
     wanted |= inside[:, few].any(axis=1)

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cembench.core.arrays import Indices, Mask, Real
+from cembench.core.arrays import Indices, Mask, Real, marked
 from cembench.mesh.flips import Independence, area_of_sides, distance_across
 from cembench.mesh.gluing import opposite_edge_ends, partners
 
@@ -78,8 +78,7 @@ def _flipped_near(
     wrong: Indices, F: Indices, lengths: Real, weights: Real
 ) -> tuple[Indices, Real, Real] | None:
     """Flip with only the triangles near these at hand; None where flips lead farther away."""
-    inside = np.zeros(int(F.max()) + 1, dtype=bool)
-    inside[F[wrong]] = True
+    inside = marked(int(F.max()) + 1, F[wrong])
     inside[F[_with_one_of(inside, F)]] = True
     near = np.flatnonzero(_with_one_of(inside, F))
     part = _Corners(F[near], lengths[near], weights[near])

@@ -27,7 +27,7 @@ from pathlib import Path
 import numpy as np
 import scipy
 
-from cembench.core.arrays import Complex, Indices, Mask, Points
+from cembench.core.arrays import Complex, Indices, Mask, Points, marked
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
@@ -296,8 +296,7 @@ class _Net:
             self._distances(), indices=root, return_predecessors=True
         )
         child = np.flatnonzero(before >= 0)
-        in_tree = np.zeros(len(self.edges), dtype=bool)
-        in_tree[self._between(child, before[child])] = True
+        in_tree = marked(len(self.edges), self._between(child, before[child]))
         crossed = self._cotree(away, in_tree)
         loose = np.flatnonzero(~(in_tree | crossed | self.rim))
         ends = [int(loop[np.argmin(away[loop])]) for loop in self.loops]
@@ -315,8 +314,7 @@ class _Net:
 
     def cut(self, graph: Iterable[int]) -> tuple[Indices, Indices]:
         """Return the triangles cut along these edges, and the original of each vertex."""
-        open_ = np.zeros(len(self.edges), dtype=bool)
-        open_[list(graph)] = True
+        open_ = marked(len(self.edges), list(graph))
         return glue(self.F, self.pairs[~open_[self.edge[self.pairs[:, 0]]]], self.n)
 
     def _between(self, i: Indices, j: Indices) -> Indices:
@@ -343,9 +341,7 @@ class _Net:
         keys = i * m + j
         order = np.argsort(keys)
         at = np.searchsorted(keys[order], chosen.row.astype(np.int64) * m + chosen.col)
-        crossed = np.zeros(len(self.edges), dtype=bool)
-        crossed[number[order[at]]] = True
-        return crossed
+        return marked(len(self.edges), number[order[at]])
 
 
 def _graph(edges: Indices, weights: Points, n: int) -> scipy.sparse.csr_array:

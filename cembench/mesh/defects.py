@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.core.arrays import Indices, Mask, Points
+from cembench.core.arrays import Indices, Mask, Points, marked
 from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
@@ -310,7 +310,7 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
         _problem(Defect.not_finite, np.flatnonzero(~finite)),
         _problem(Defect.out_of_range, np.flatnonzero(~inside), F, last=len(V) - 1),
         scale,
-        _problem(Defect.isolated, np.flatnonzero(finite & ~_used(F[inside], len(V)))),
+        _problem(Defect.isolated, np.flatnonzero(finite & ~marked(len(V), F[inside]))),
     ]
     turned = np.zeros(0, dtype=bool)
     if len(valid):
@@ -392,9 +392,7 @@ def duplicates(F: Indices) -> Mask:
     """Whether each triangle has the same three vertices as an earlier one."""
     alike = np.sort(F, axis=1)
     order = np.lexsort(alike.T)  # stable: the first of equal ones stays first
-    extra = np.zeros(len(F), dtype=bool)
-    extra[order[1:][(alike[order[1:]] == alike[order[:-1]]).all(axis=1)]] = True
-    return extra
+    return marked(len(F), order[1:][(alike[order[1:]] == alike[order[:-1]]).all(axis=1)])
 
 
 def representatives(V: Points, tolerance: float = 0.0) -> Indices:
@@ -457,12 +455,12 @@ def coincident(V: Points) -> Problem | None:
 def components(F: Indices, n: int) -> Problem | None:
     """Return the problem that triangles form several connected pieces, or None."""
     _, label = topology.components(F, n)
-    vertices = np.bincount(label, weights=_used(F, n)).astype(int)
+    vertices = np.bincount(label, weights=marked(n, F)).astype(int)
     pieces = np.flatnonzero(vertices)
     if len(pieces) == 1:
         return None
     ends = (vertices.argmax(), pieces[::-1][vertices[pieces[::-1]].argmin()])  # of equal ones, too
-    large, small = (np.flatnonzero((label == end) & _used(F, n))[0] for end in ends)
+    large, small = (np.flatnonzero((label == end) & marked(n, F))[0] for end in ends)
     text = (
         f"the mesh has {len(pieces)} connected components (vertex {large} lies in the largest, "
         f"with {vertices.max()} of {vertices.sum()} vertices, vertex {small} in the smallest); "
@@ -489,13 +487,6 @@ def _remarks(thin: Indices, turned: Mask) -> tuple[Notice, ...]:
         count = f"{turned.sum()} of {len(turned)} triangles were turned over"
         texts[NoticeKind.ORIENTATION_REPAIRED] = f"orientation repaired: {count}"
     return tuple(Notice(kind, text) for kind, text in texts.items())
-
-
-def _used(F: Indices, n: int) -> Mask:
-    """Whether each of n vertices belongs to a triangle."""
-    used = np.zeros(n, dtype=bool)
-    used[F] = True
-    return used
 
 
 #: What is wrong, by defect, where a list of vertices or triangles says all: `some` are the first of
@@ -582,5 +573,5 @@ def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
         import igl
 
         manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
-        bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
+        bad = np.flatnonzero(~manifold & marked(len(manifold), proper))
     return _problem(Defect.vertices, bad)

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cembench.core.arrays import Indices, Mask, Points
+from cembench.core.arrays import Indices, Mask, Points, marked
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -347,8 +347,7 @@ def _triangles(
     polygon = np.repeat(np.arange(len(sizes)), sizes)
     finite = np.append(np.isfinite(V).all(axis=1), False)
     inside = (corners >= 0) & (corners < len(V))
-    bad = np.zeros(len(sizes), dtype=bool)
-    bad[polygon[~finite[np.where(inside, corners, -1)]]] = True
+    bad = marked(len(sizes), polygon[~finite[np.where(inside, corners, -1)]])
     corners, sizes = corners[~bad[polygon]], sizes[~bad]
     steps[Step.invalid_faces] = int(bad.sum())
     steps[Step.polygons] = int((sizes > 3).sum())
@@ -581,8 +580,7 @@ def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
     count, label = topology.components(F, len(V))
     piece = label[F[:, 0]]
     _, edge, faces = edges_of_half_edges(F)
-    closed = np.ones(count, dtype=bool)
-    closed[np.repeat(piece, 3)[faces[edge] == 1]] = False
+    closed = ~marked(count, np.repeat(piece, 3)[faces[edge] == 1])
     centre = V - V[F].mean(axis=(0, 1))
     a, b, c = (centre[F[:, k]] for k in range(3))
     volume = np.bincount(piece, np.einsum("td,td->t", a, np.cross(b, c)), minlength=count)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Indices, Points, marked
 from cembench.mesh.defects import LARGEST_LENGTH, representatives
 from cembench.mesh.gluing import edges_of_half_edges
 from cembench.mesh.topology import boundary_loops, first_of_linked
@@ -64,8 +64,7 @@ def are_copies(F: Indices, first: Indices) -> bool:
 
     """
     at, counts = first[F], np.bincount(first)
-    joined = np.zeros(len(counts), dtype=bool)
-    joined[at[at == np.roll(at, 1, axis=1)]] = True
+    joined = marked(len(counts), at[at == np.roll(at, 1, axis=1)])
     lone = np.bincount(first, np.bincount(F.ravel(), minlength=len(first)) == 1) == counts
     if 1 <= np.count_nonzero((joined | lone) & (counts >= _POLE)) <= 2:
         return True

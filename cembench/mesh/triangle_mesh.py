@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import printable
@@ -405,8 +405,7 @@ def definition_1_notices(F: Indices, n: int, loops: Loops) -> tuple[Notice, ...]
 
 def _breaks_of_definition_1(F: Indices, n: int, loops: Loops) -> Iterator[str]:
     """Yield a text for each condition of Definition 1 that the mesh breaks."""
-    inside = np.ones(n, dtype=bool)
-    inside[np.concatenate(loops)] = False
+    inside = ~marked(n, np.concatenate(loops))
     if not inside.any():
         yield "(ii), (iv) broken: the mesh has no interior vertex"
         return
