@@ -39,7 +39,7 @@ LARGEST_REACH = 0.15
 #: Tolerance for landmarks at their targets, in units of the unit disk's radius.
 NEAR = 2e-3
 #: Maximum number of steps, and of reductions of lambda within a step.
-MAX_STEPS, MOST_TRIES = 40, 8
+MOST_STEPS, MOST_TRIES = 40, 8
 #: Share of the distance to the first fold that a step takes.
 CAUTION = 0.7
 #: Approximate capacity of a landmark's disk in the unit disk; used only to choose lambdas.
@@ -110,7 +110,7 @@ def register(
         return Registration(uv, (lam,), _error(uv, landmarks, targets))
     z, exponent = radially_stretched(mesh, start, landmarks, targets)
     lambdas = []
-    for _ in range(MAX_STEPS):
+    for _ in range(MOST_STEPS):
         at = z[landmarks]
         with phase("laplacian"):
             L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
