@@ -226,14 +226,15 @@ class _ClusterRun:
         job = worker.job
         if job is None or future is not job.future:
             return
+        error = future.exception() if future.status == "error" else None
+        if error is not None and not isinstance(error, KilledWorker):
+            name = job.unit.mesh.name
+            raise ClusterError(f"{name} cannot be measured on {worker.machine}: {error}") from error
         try:
             answer = future.result(timeout=ARRIVES_WITHIN)
         except (OSError, TimeoutError, CancelledError, KilledWorker):  # its worker has just ended
             self._look()
             self._lose(worker)
-        except Exception as error:
-            name = job.unit.mesh.name
-            raise ClusterError(f"{name} cannot be measured on {worker.machine}: {error}") from error
         else:
             self._save(worker, job, answer)
 
