@@ -96,7 +96,7 @@ class Launcher:
         )
         limits = Limits(seconds, self.options.memory_bytes)
         server = judges_server(self.number) if judges else self._own_server(job)
-        ending = server and self._forked(server, job, limits, log)
+        ending = server and self._forked(server, job, limits, log, alone=judges)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # the folder may be gone
             remove(programs)  # of a program that was ended
@@ -153,20 +153,21 @@ class Launcher:
                 self.forks = False
         return self._server
 
-    def _forked(self, server: ForkServer, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
+    def _forked(
+        self, server: ForkServer, job: Job, limits: Limits, log: Path, *, alone: bool
+    ) -> ProcessEnd | None:
         """Run a process forked from this server; return its end, None if the server is gone."""
         path = self._write(job.model_copy(update={"parent": server.pid}))
-        judges = server is not self._server  # they start no processes
         try:
             start = server.forking(path)
-            end = run_limited(start, limits, log, alone=judges, stopped=self.stopped.is_set)
+            end = run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
             return replace(end, cpu_seconds=server.cpu_seconds())
         except ServerGoneError:
-            if judges:
+            if server is self._server:
+                self.close()
+            else:
                 judges_server.cache_clear()
                 server.close()
-            else:
-                self.close()
         return None
 
     def _write(self, job: Job) -> Path:
