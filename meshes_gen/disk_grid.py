@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cembench.core.arrays import Complex, Indices
 
 
-def disk_grid(faces: int) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
+def disk_grid(faces: int) -> tuple[Complex, Indices]:
     """Return points z (n,) and triangles F (m, 3) of r concentric rings, ring k with 6 k points.
 
     The number of triangles, 6 r^2, is as close as possible to `faces`. The triangulation is
@@ -18,7 +19,7 @@ def disk_grid(faces: int) -> tuple[NDArray[np.complex128], NDArray[np.int64]]:
     j = np.arange(len(k)) + 1 - first[k]
     z = np.concatenate([[0], k / rings * np.exp(2j * np.pi * j / (6 * k))])
 
-    def at(ring: NDArray[np.int64], place: NDArray[np.int64]) -> NDArray[np.int64]:
+    def at(ring: Indices, place: Indices) -> Indices:
         return np.where(ring == 0, 0, first[ring] + place % np.maximum(6 * ring, 1))
 
     # Each of the six sectors of ring k has k triangles with an edge on it, and k - 1 without.

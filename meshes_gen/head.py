@@ -6,11 +6,10 @@ is 1.5 wide, from the chin at z = -1.15 to the crown at z = 1.1.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.core.arrays import Real
 
@@ -69,7 +68,6 @@ class Head:
     expression: Expression = NEUTRAL
     ears: bool = True
     neck: bool = True
-    _cache: dict[str, NDArray[np.float64]] = field(default_factory=dict, compare=False, repr=False)
 
     def skull(self, p: Real) -> Real:
         """Return the field of the head without features."""
@@ -97,19 +95,22 @@ class Head:
         return np.stack([x, y, z], axis=1)
 
     @cached_property
-    def _points(self) -> dict[str, NDArray[np.float64]]:
+    def _points(self) -> dict[str, Real]:
         # Assigned at once, since fields are evaluated on several threads.
-        P, c = self.person, dict[str, NDArray[np.float64]]()
+        P, c = self.person, dict[str, Real]()
         c["mouth"] = self._mouth()
         for s, side in ((-1, "right"), (1, "left")):
             x = 0.275 * s
             c[f"eye_{side}"] = np.array([x, self.front(x, -0.02) + 0.075, -0.02])
+            x, z = 0.36 * s, -0.30
+            c[f"cheek_{side}"] = np.array([x, self.front(x, z) + 0.13, z + self.expression.cheeks])
             bx = np.array([0.12, 0.30, 0.47]) * s
             bz = np.array([0.13, 0.185, 0.13]) + self.expression.brows[(s + 1) // 2]
             by = np.array([self.front(a, b) for a, b in zip(bx, bz, strict=True)]) + 0.0
             c[f"brow_{side}"] = np.stack([bx, by, bz], axis=1)
         c["tip"] = np.array([0, self.front(0, -0.33) - 0.21 * P.nose, -0.335])
         c["bridge"] = np.array([0, self.front(0, 0.06) - 0.0, 0.08])
+        c["base"] = np.array([0, self.front(0, -0.34) - 0.02, -0.34])
         return c
 
     def __call__(self, p: Real) -> Real:
@@ -132,14 +133,13 @@ class Head:
     def _features(self, p: Real, d: Real) -> Real:
         """Add cheeks, brows, eyes, nose and mouth to the skull's field d at p."""
         P, e, c = self.person, self.expression, self._points
-        for s, side in ((-1, "right"), (1, "left")):
+        for side in ("right", "left"):
             eye = c[f"eye_{side}"]
-            cheek = (0.36 * s, self.front_cached(0.36 * s, -0.30) + 0.13, -0.30 + e.cheeks)
-            d = join(d, sphere(p, cheek, (0.15 + 0.35 * e.cheeks) * P.cheeks), 0.16)
+            d = join(d, sphere(p, c[f"cheek_{side}"], (0.15 + 0.35 * e.cheeks) * P.cheeks), 0.16)
             d = carve(d, ellipsoid(p, eye + (0, -0.09, 0), (0.185, 0.12, 0.115)), 0.12)
             d = join(d, tube(p, c[f"brow_{side}"], [0.045, 0.055 * P.brow, 0.035]), 0.09)
-        base = np.array([0, self.front_cached(0, -0.34) - 0.02, -0.34])
-        d = join(d, cone(p, c["bridge"] + (0, 0.05, 0), base, 0.06, 0.125 * P.nose_width), 0.10)
+        upper = c["bridge"] + (0, 0.05, 0)
+        d = join(d, cone(p, upper, c["base"], 0.06, 0.125 * P.nose_width), 0.10)
         d = join(d, cone(p, c["bridge"], c["tip"], 0.045, 0.085 * P.nose_width), 0.10)
         for s in (-1, 1):
             wing = c["tip"] + (0.095 * s * P.nose_width, 0.10, -0.035)
@@ -149,13 +149,6 @@ class Head:
         for side in ("right", "left"):
             d = self._eye(p, d, c[f"eye_{side}"])
         return self._lips(p, d, c["mouth"])
-
-    def front_cached(self, x: float, z: float) -> float:
-        """Return :meth:`front`, cached."""
-        key = f"front {x} {z}"
-        if key not in self._cache:
-            self._cache[key] = np.array(self.front(x, z))
-        return float(self._cache[key])
 
     def _eye(self, p: Real, d: Real, centre: Real) -> Real:
         open_ = self.person.eyes * (1 - self.expression.squint)
@@ -197,7 +190,7 @@ class Head:
         hollow = ellipsoid(p, at + (0.065 * s, -0.02, 0.03), (0.06, 0.10, 0.17), turn)
         return carve(d, hollow, 0.04)
 
-    def landmarks(self) -> dict[str, NDArray[np.float64]]:
+    def landmarks(self) -> dict[str, Real]:
         """Return points near the surface: nose tip, corners of eyes and mouth, lips; (3,) each."""
         c, P, mouth = self._points, self.person, self._between_lips()
         vertices = {

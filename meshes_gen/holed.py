@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.core.arrays import Real
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
@@ -24,7 +23,7 @@ from .rows import ROWS
 CAP, PLACE, HOLE = 100.0, 55.0, 14.0
 
 
-def hole_centres(holes: int) -> NDArray[np.float64]:
+def hole_centres(holes: int) -> Real:
     """Return the centres of the cap's holes: unit vectors (holes, 3), evenly around the pole."""
     turn = 2 * np.pi * np.arange(holes) / holes
     polar = np.deg2rad(PLACE)
@@ -48,7 +47,7 @@ def holed_cap_body(holes: int) -> Body:
     )
 
 
-def exact_map(V: NDArray[np.float64]) -> NDArray[np.complex128]:
+def exact_map(V: Real) -> Complex:
     """Return the cap's map to the unit disk with round holes: stereographic projection."""
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(CAP) / 2)
 

@@ -6,10 +6,9 @@ from typing import Annotated
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.triangle_mesh import HoledMesh
 from cembench.registry import MOST_FACES, surface_family
 
@@ -43,7 +42,7 @@ def holed_disk(
     return HoledMesh.from_arrays(V, F, name="holed-disk")
 
 
-def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, NDArray[np.int64]]:
+def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, Indices]:
     """Return V (n, 3) and F of the flat unit disk with round holes, with about `faces` triangles.
 
     A triangular lattice inside and evenly spaced points on the circles, in a Delaunay
@@ -60,7 +59,7 @@ def disk_with_holes(centres: Complex, radii: Real, faces: int) -> tuple[Real, ND
     return np.stack([z.real, z.imag, np.zeros(len(z))], axis=1), F
 
 
-def _points(centres: Complex, radii: Real, h: float) -> tuple[Complex, NDArray[np.int64]]:
+def _points(centres: Complex, radii: Real, h: float) -> tuple[Complex, Indices]:
     """Return points (n,) and their circles: 0 for the unit circle, k for a hole, -1 for none."""
     circles, rim = [], []
     for k, (c, r) in enumerate([(0j, 1.0), *zip(centres, radii, strict=True)]):

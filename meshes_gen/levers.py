@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from pydantic import Field
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Real, marked
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 from .local_operations import (
@@ -150,8 +150,7 @@ def _jagged(V: Real, F: Indices, jag: float, rng: np.random.Generator) -> Real:
     length = np.linalg.norm(V[after] - V[at], axis=1) + np.linalg.norm(V[at] - V[before], axis=1)
     V = V.copy()
     V[at] += (jag * rng.uniform(-1, 1, len(at)) * length / 2)[:, None] * across
-    near = np.zeros(len(V), dtype=bool)
-    near[F[boundary_mask(F, len(V))[F].any(axis=1)]] = True
+    near = marked(len(V), F[boundary_mask(F, len(V))[F].any(axis=1)])
     near[at] = False
     some = F[near[F].any(axis=1)]
     for _ in range(3):

@@ -10,9 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Mask, Real, marked
 
 
 @dataclass(frozen=True)
@@ -28,15 +27,13 @@ class Edges:
     corner: Indices
 
     @property
-    def on_boundary(self) -> NDArray[np.bool_]:
+    def on_boundary(self) -> Mask:
         """Whether each edge has a single triangle."""
         return self.face[:, 1] < 0
 
-    def rim(self, n: int) -> NDArray[np.bool_]:
+    def rim(self, n: int) -> Mask:
         """Return whether each of the n vertices is on the boundary."""
-        mask = np.zeros(n, dtype=bool)
-        mask[self.ends[self.on_boundary]] = True
-        return mask
+        return marked(n, self.ends[self.on_boundary])
 
 
 def edges_of(F: Indices, n: int) -> Edges:
@@ -60,15 +57,14 @@ def edges_of(F: Indices, n: int) -> Edges:
     )
 
 
-def boundary_mask(F: Indices, n: int) -> NDArray[np.bool_]:
+def boundary_mask(F: Indices, n: int) -> Mask:
     """Whether each of the n vertices is on the boundary."""
     return edges_of(F, n).rim(n)
 
 
 def compact(V: Real, F: Indices) -> tuple[Real, Indices]:
     """Return the same mesh without unused vertices."""
-    used = np.zeros(len(V), dtype=bool)
-    used[F] = True
+    used = marked(len(V), F)
     return V[used], (np.cumsum(used) - 1)[F]
 
 
@@ -105,7 +101,7 @@ def mean_of_neighbours(V: Real, F: Indices) -> Real:
     return total / np.maximum(count, 1)[:, None]
 
 
-def _ranks(priority: Real) -> NDArray[np.int64]:
+def _ranks(priority: Real) -> Indices:
     """Return ranks from 1 for the lowest priority; ties are broken by position."""
     ranks = np.empty(len(priority), dtype=np.int64)
     ranks[np.argsort(priority, kind="stable")] = np.arange(1, len(priority) + 1)
@@ -113,7 +109,7 @@ def _ranks(priority: Real) -> NDArray[np.int64]:
 
 
 def split(
-    V: Real, F: Indices, edges: Edges, chosen: NDArray[np.int64], priority: Real
+    V: Real, F: Indices, edges: Edges, chosen: Indices, priority: Real
 ) -> tuple[Real, Indices]:
     """Split those `chosen` edges that have the first `priority` in both of their triangles."""
     rank = _ranks(priority)
@@ -137,12 +133,7 @@ def split(
 
 
 def collapse(
-    V: Real,
-    F: Indices,
-    edges: Edges,
-    chosen: NDArray[np.int64],
-    length: Real,
-    most: int | None = None,
+    V: Real, F: Indices, edges: Edges, chosen: Indices, length: Real, most: int | None = None
 ) -> tuple[Real, Indices]:
     """Collapse an independent set of the `chosen` edges, the shortest by `length` first.
 
@@ -179,26 +170,7 @@ def collapse(
     b = bound[ends]
     one = b[:, 0] != b[:, 1]
     where[one] = V[np.where(b[one, 0], ends[one, 0], ends[one, 1])]
-    # No triangle may be reversed or become a sliver.
-    owner = np.full(n, -1)
-    owner[ends[:, 0]] = owner[ends[:, 1]] = np.arange(len(ends))
-    own = owner[F]
-    touched = np.flatnonzero((own >= 0).sum(axis=1) == 1)
-    T, o = F[touched], own[touched]
-    moved = np.where((o >= 0)[:, :, None], where[o], V[T])
-    before = area_vectors(V, T)
-    after = np.cross(moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0])
-    longest = np.stack(
-        [((moved[:, c] - moved[:, (c + 1) % 3]) ** 2).sum(axis=1) for c in range(3)]
-    ).max(axis=0)
-    size = np.linalg.norm(after, axis=1)
-    cosine = (before * after).sum(axis=1) / np.maximum(
-        np.linalg.norm(before, axis=1) * size, 1e-300
-    )
-    bad = (cosine < 0.3) | (size < 0.02 * longest)
-    spoiled = np.zeros(len(ends), dtype=bool)
-    spoiled[o.max(axis=1)[bad]] = True
-    keep = np.flatnonzero(~spoiled)
+    keep = np.flatnonzero(~_spoil_triangles(V, F, ends, where))
     if most is not None:
         keep = keep[np.argsort(rank[keep])[:most]]
     V = V.copy()
@@ -208,6 +180,25 @@ def collapse(
     F = target[F]
     alive = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
     return compact(V, F[alive])
+
+
+def _spoil_triangles(V: Real, F: Indices, ends: Indices, where: Real) -> Mask:
+    """Whether edges (k, 2) that collapse to these points reverse a triangle or make slivers."""
+    owner = np.full(len(V), -1)
+    owner[ends[:, 0]] = owner[ends[:, 1]] = np.arange(len(ends))
+    own = owner[F]
+    touched = np.flatnonzero((own >= 0).sum(axis=1) == 1)
+    T, o = F[touched], own[touched]
+    moved = np.where((o >= 0)[:, :, None], where[o], V[T])
+    before = area_vectors(V, T)
+    after = np.cross(moved[:, 1] - moved[:, 0], moved[:, 2] - moved[:, 0])
+    sides = ((moved - np.roll(moved, -1, axis=1)) ** 2).sum(axis=2)
+    size = np.linalg.norm(after, axis=1)
+    cosine = (before * after).sum(axis=1) / np.maximum(
+        np.linalg.norm(before, axis=1) * size, 1e-300
+    )
+    bad = (cosine < 0.3) | (size < 0.02 * sides.max(axis=1))
+    return marked(len(ends), o.max(axis=1)[bad])
 
 
 def _cotangents(V: Real, p: Indices, i: Indices, j: Indices) -> Real:
@@ -234,7 +225,7 @@ class Quads:
         """Return the same sums for the other diagonal p q."""
         return _cotangents(V, self.i, self.p, self.q) + _cotangents(V, self.j, self.q, self.p)
 
-    def folds(self, V: Real) -> NDArray[np.bool_]:
+    def folds(self, V: Real) -> Mask:
         """Whether the other diagonal would fold the surface."""
         T = (V[self.p], V[self.i], V[self.q], V[self.j])
         old0, old1 = np.cross(T[1] - T[0], T[3] - T[0]), np.cross(T[3] - T[2], T[1] - T[2])
@@ -247,7 +238,7 @@ class Quads:
             folded |= np.linalg.norm(new, axis=1) <= 1e-4 * size
         return folded
 
-    def take(self, k: NDArray[np.int64] | NDArray[np.bool_]) -> Quads:
+    def take(self, k: Indices | Mask) -> Quads:
         """Return a selection of them."""
         return Quads(self.i[k], self.j[k], self.p[k], self.q[k], self.face[k])
 
@@ -308,8 +299,7 @@ def delaunay_flips(V: Real, F: Indices, rounds: int = 40) -> Indices:
             break
         F = F.copy()
         F[active] = part
-        near = np.zeros(n, dtype=bool)
-        near[F[active[changed]]] = True
+        near = marked(n, F[active[changed]])
         for _ in range(2):
             near[F[near[F].any(axis=1)]] = True
         active = np.flatnonzero(near[F].any(axis=1))

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices
 
 
-def rectangle_grid(faces: int, aspect: float) -> tuple[Complex, NDArray[np.int64]]:
+def rectangle_grid(faces: int, aspect: float) -> tuple[Complex, Indices]:
     """Return points and about `faces` triangles of the rectangle 0 <= x <= aspect, 0 <= y <= 1.
 
     Squares with alternating diagonals, an even number in each direction, so that every corner has a

@@ -10,10 +10,9 @@ from typing import Annotated
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Real
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
 from cembench.registry import MOST_FACES, surface_family
@@ -89,7 +88,7 @@ def catenoid_sheet(
     return DiskMesh.from_arrays(V, F, name="catenoid-sheet")
 
 
-def ring_map(V: NDArray[np.float64]) -> Complex:
+def ring_map(V: Real) -> Complex:
     """Return the conformal map of the catenoid ring to an annulus, its waist to the unit circle."""
     return np.exp(-V[:, 2] + 1j * np.arctan2(V[:, 1], V[:, 0]))
 

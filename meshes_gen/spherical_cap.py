@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Annotated
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
@@ -15,7 +15,7 @@ from .disk_grid import disk_grid
 from .levers import with_levers
 
 
-def exact_map(V: NDArray[np.float64], angle: float = 90.0) -> NDArray[np.complex128]:
+def exact_map(V: Real, angle: float = 90.0) -> Complex:
     """Return the cap's conformal map to the unit disk: stereographic from the south pole."""
     return (V[:, 0] + 1j * V[:, 1]) / (1 + V[:, 2]) / np.tan(np.deg2rad(angle) / 2)
 

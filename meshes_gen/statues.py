@@ -87,6 +87,28 @@ def statue_of_liberty_body(seed: int = 0) -> Body:
     return Body(f, halfspace((0, 0, 1), -0.15), (-1.5, -1.15, -0.45), (1.5, 1.15, 6.75), 300)
 
 
+def _throne(p: Real) -> Real:
+    """Return the field of the throne, with ribs on its sides."""
+    seat = box(p, (0, 0.30, 0.68), (0.70, 0.72, 0.70), 0.05)
+    back = box(p, (0, 0.92, 1.45), (0.66, 0.16, 0.85), 0.05)
+    foot = box(p, (0, -0.45, 0.0), (0.74, 1.25, 0.14), 0.04)
+    d = join(join(seat, back, 0.06), foot, 0.06)
+    panel = 0.03 * np.cos(2 * np.pi * p[:, 2] / 0.22) * np.exp(-(((p[:, 2] - 0.75) / 0.5) ** 6))
+    return d - panel * (np.abs(p[:, 0]) > 0.5)
+
+
+def _crown(p: Real) -> Real:
+    """Return the field of the crown: the disk of the sun between horns."""
+    disk = ellipsoid(p, (0, 0.12, 4.42), (0.36, 0.09, 0.36))
+    base = meet(np.hypot(p[:, 0], p[:, 1] - 0.12) - 0.26, np.abs(p[:, 2] - 3.98) - 0.10, 0.04)
+    d = join(disk, base, 0.06)
+    for s in (-1, 1):
+        ends = [(0.14, 4.02), (0.42, 4.22), (0.50, 4.58), (0.40, 4.98)]
+        horn = [(x * s, 0.12, z) for x, z in ends]
+        d = join(d, tube(p, horn, [0.10, 0.095, 0.075, 0.035], 0.03), 0.05)
+    return d
+
+
 def isis_statue_body(seed: int = 0) -> Body:
     """A goddess on a throne with a child on her lap; horns and the sun's disk on her head."""
     head = Head(Person(jaw=0.95, nose=0.95, lips=1.1), NEUTRAL, ears=False, neck=False)
@@ -116,14 +138,6 @@ def isis_statue_body(seed: int = 0) -> Body:
             d = join(d, tube(p, arm, [0.19, 0.155, 0.12], 0.04), 0.10)
         return d
 
-    def throne(p: Real) -> Real:
-        seat = box(p, (0, 0.30, 0.68), (0.70, 0.72, 0.70), 0.05)
-        back = box(p, (0, 0.92, 1.45), (0.66, 0.16, 0.85), 0.05)
-        foot = box(p, (0, -0.45, 0.0), (0.74, 1.25, 0.14), 0.04)
-        d = join(join(seat, back, 0.06), foot, 0.06)
-        panel = 0.03 * np.cos(2 * np.pi * p[:, 2] / 0.22) * np.exp(-(((p[:, 2] - 0.75) / 0.5) ** 6))
-        return d - panel * (np.abs(p[:, 0]) > 0.5)
-
     def child(p: Real) -> Real:
         d = tube(p, [(-0.12, -0.62, 1.86), (0.10, -0.50, 2.0)], [0.24, 0.22])
         right = [(-0.20, -0.62, 1.82), (-0.36, -1.12, 1.74), (-0.34, -1.18, 1.40)]
@@ -133,18 +147,8 @@ def isis_statue_body(seed: int = 0) -> Body:
         d = join(d, cone(p, (0.10, -0.52, 2.0), (0.18, -0.50, 2.30), 0.18, 0.11), 0.08)
         return join(d, _placed(small, p, (0.20, -0.52, 2.48), 0.22), 0.05)
 
-    def crown(p: Real) -> Real:
-        disk = ellipsoid(p, (0, 0.12, 4.42), (0.36, 0.09, 0.36))
-        base = meet(np.hypot(p[:, 0], p[:, 1] - 0.12) - 0.26, np.abs(p[:, 2] - 3.98) - 0.10, 0.04)
-        d = join(disk, base, 0.06)
-        for s in (-1, 1):
-            ends = [(0.14, 4.02), (0.42, 4.22), (0.50, 4.58), (0.40, 4.98)]
-            horn = [(x * s, 0.12, z) for x, z in ends]
-            d = join(d, tube(p, horn, [0.10, 0.095, 0.075, 0.035], 0.03), 0.05)
-        return d
-
     def f(p: Real) -> Real:
-        d = join(figure(p), throne(p), 0.08)
+        d = join(figure(p), _throne(p), 0.08)
         d = join(d, child(p), 0.05)
         d = join(d, tube(p, [(0, 0.14, 2.8), (0, 0.10, 3.3)], [0.22, 0.19]), 0.15)
         d = join(d, _placed(head, p, (0, 0.04, 3.52), 0.40), 0.06)
@@ -155,7 +159,7 @@ def isis_statue_body(seed: int = 0) -> Body:
         wig = join(wig, tube(p, [(0, 0.42, 3.6), (0, 0.42, 2.7)], [0.28, 0.3]), 0.08)
         strands = 0.013 * np.cos(2 * np.pi * p[:, 2] / 0.11)
         d = join(d, wig - strands, 0.03)
-        d = join(d, crown(p), 0.04)
+        d = join(d, _crown(p), 0.04)
         collar = np.linalg.norm(p - (0, 0.2, 3.05), axis=1)
         d = d - 0.02 * np.cos(2 * np.pi * collar / 0.12) * np.clip((0.62 - collar) * 6, 0, 1)
         return d - 0.004 * stone(p)

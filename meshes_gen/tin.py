@@ -11,10 +11,9 @@ from typing import Annotated
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from pydantic import Field
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import MOST_FACES, surface_family
 
@@ -75,7 +74,7 @@ class _Line:
             [-0.6, 0.02, 2, 0], [0.6, 0.15, 6, 2 * np.pi]
         )
 
-    def _height(self, x: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _height(self, x: Real) -> Real:
         return self.middle + self.wave * np.sin(self.number * x + self.phase)
 
     @property
@@ -93,13 +92,13 @@ class _Line:
             np.concatenate([x + 1j * (self._height(x) + up) for up in (0, self.apart)]) * self.turn
         )
 
-    def share_above(self, plan: Complex) -> NDArray[np.float64]:
+    def share_above(self, plan: Complex) -> Real:
         """Return how far points are from the lower wave to the upper one, 0 to 1."""
         w = plan / self.turn
         return np.clip((w.imag - self._height(w.real)) / self.apart, 0, 1)
 
 
-def _triangulated(corners: Complex, points: Complex) -> tuple[Complex, NDArray[np.int64]]:
+def _triangulated(corners: Complex, points: Complex) -> tuple[Complex, Indices]:
     """Return the Delaunay triangulation of a convex polygon with points inside, the others left."""
     sides = np.roll(corners, -1) - corners
     from_each = (points / INSIDE)[:, None] - corners

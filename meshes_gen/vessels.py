@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.core.arrays import Real
 
 from .implicit import Body, Noise, box, carve, halfspace, join, meet, ring
 
 
-def revolve(p: Real, profile: NDArray[np.float64]) -> Real:
+def revolve(p: Real, profile: Real) -> Real:
     """Return about the distance to a surface of revolution; rows of `profile` are (z, radius)."""
     radius = scipy.interpolate.PchipInterpolator(profile[:, 0], profile[:, 1])
     z = np.clip(p[:, 2], profile[0, 0], profile[-1, 0])

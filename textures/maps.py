@@ -100,7 +100,7 @@ class Maps:
     #: Whether each map is on the algorithm's refinement of the surface, which is then written.
     overlay: bool = False
     #: Whether each surface is mapped in a process of its own, which keeps the limits.
-    apart: bool = True
+    own_process: bool = True
     done: list[Mapped] = field(default_factory=list)
     missing: list[Path] = field(default_factory=list)
 
@@ -154,7 +154,7 @@ class Maps:
             if self.overlay:
                 record, mesh, uv = overlay_here(task)
                 surface, words = replace(surface, mesh=mesh), _overlay(mesh, surface.mesh)
-            elif self.apart or not may_run_here(task):
+            elif self.own_process or not may_run_here(task):
                 from cembench.running.local import map_once
 
                 record, uv = map_once(task, self.options)

@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.unit_square import to_unit_square
 
 #: Gap between shells as a share of the atlas's side, so that their texels do not mix.
@@ -56,7 +55,7 @@ def packed(
     return moved
 
 
-def _rows(sides: NDArray[np.float64]) -> list[complex] | None:
+def _rows(sides: Real) -> list[complex] | None:
     """Return the lower left corners of squares in rows; None if they do not fit."""
     places = []
     x = y = height = 0.0

@@ -16,7 +16,7 @@ from cembench.registry import algorithm
 from .constraints import Angles, kept_positive, placed
 
 #: Minimal curvature of the Lagrangian at a corner, as a share of that of its error.
-LEAST_CURVATURE = 0.3
+MIN_CURVATURE = 0.3
 
 
 @algorithm(
@@ -59,7 +59,7 @@ def abf_plus_plus(
         at = np.where(number >= 0, y_w[number], 0.0)
         # A corner is next to one corner of its triangle and before the other.
         bent = (np.roll(at, 1, axis=1) - np.roll(at, -1, axis=1)) / np.sin(angles) ** 2
-        curvature = np.maximum(weight + bent, LEAST_CURVATURE * weight)
+        curvature = np.maximum(weight + bent, MIN_CURVATURE * weight)
         e, y_w = problem.step(angles, 1 / curvature, weight * (angles - wanted))
         angles, share = kept_positive(angles, e)
         extras = problem.told(angles)

@@ -28,7 +28,7 @@ CANDIDATES = {
 }
 
 #: The most steps from the best map, and what each costs as in :class:`Candidate`.
-MOST_STEPS, STEP = 10, 4.0
+MAX_STEPS, STEP = 10, 4.0
 
 
 @algorithm(
@@ -59,6 +59,6 @@ def best(
     error, in degrees, and the texel density ratio of each, before all this.
     """
     chosen = best_of(mesh, [CANDIDATES], work, repair=repair)
-    most = min(MOST_STEPS, int(work / (STEP * mesh.m)))
+    most = min(MAX_STEPS, int(work / (STEP * mesh.m)))
     uv, steps = evened(mesh, angle_gauge(mesh, chosen.uv), most)
     return replace(chosen, uv=uv, extras=chosen.extras | {"even_steps": steps})

@@ -19,7 +19,7 @@ from cembench.core.errors import AlgorithmFailed
 #: No crossing: a path begins or ends at a vertex.
 END = -1
 #: Crossings that flips may make, so many and so many for each edge: some seconds' worth.
-MOST, MOST_OF_AN_EDGE = 2_000_000, 20
+MOST, MAX_OF_AN_EDGE = 2_000_000, 20
 
 
 @dataclass
@@ -91,7 +91,7 @@ class Crossings:
             The paths cross the edges too often.
 
         """
-        most = MOST + MOST_OF_AN_EDGE * len(self.on_edge)
+        most = MOST + MAX_OF_AN_EDGE * len(self.on_edge)
         for some in rounds:
             for h in some.tolist():
                 self.flip(h)

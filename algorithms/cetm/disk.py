@@ -80,13 +80,8 @@ def cetm(
     uv[b] /= np.abs(uv[b])
     kept = cross_ratio_change(mesh, uv)
     uv, folds = accepted_repair(mesh, uv, laplacian(mesh), repair=repair)
-    extras = {
-        "curvature": flattened.residual,
-        "factorisations": flattened.factorisations,
-        "cross_ratios": kept,
-        "at_infinity": v,
-    }
-    return Parameterization(uv, len(flattened.history) - 1, extras={**extras, **folds})
+    extras = flattened.told | {"cross_ratios": kept, "at_infinity": v} | folds
+    return Parameterization(uv, len(flattened.history) - 1, extras=extras)
 
 
 def _with_infinity_at(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +28,24 @@ UPHILL = 0.5
 SHORTER = 40
 
 
+def descended(
+    at: Callable[[Real], tuple[Real, Any, Any]], u: Real, step: Real, along: Real, slope: float
+) -> tuple[Real, Real, Any, Any]:
+    """Halve a step until the energy does not rise too steeply at its end.
+
+    `at` returns minus the gradient (k,) there, and what else is known; `along` (k,) is the step in
+    the same unknowns, `slope` minus the energy's slope at its start. Returns where the step leads,
+    and what `at` returns there.
+    """
+    share = 1.0
+    for _ in range(SHORTER):
+        there = at(u + share * step)
+        if float(there[0] @ along) <= -UPHILL * slope:
+            break
+        share /= 2
+    return u + share * step, *there
+
+
 @dataclass(frozen=True)
 class FlatMetric:
     """The result of Newton's method.
@@ -38,23 +58,22 @@ class FlatMetric:
         Scaled lengths, opposite to each corner.
     angles : float (m, 3)
         In radians.
-    residual : float
-        The largest error of an angle sum, in radians.
     history : tuple of float
-        The residual at the start and after each step.
-    factorisations : int
-        Number of factorisations of the Hessian; its pattern was analysed once.
+        The largest error of an angle sum, in radians, at the start and after each step.
 
     """
 
     u: Real
     lengths: Real
     angles: Real
-    residual: float
     history: tuple[float, ...]
-    factorisations: int
     pattern: BlockPattern
     cholesky: Cholesky
+
+    @property
+    def told(self) -> dict[str, float]:
+        """What an algorithm tells of it: the last error, and how often one pattern was factored."""
+        return {"curvature": self.history[-1], "factorisations": len(self.history)}
 
     def laid_out(self, F: Indices, fixed: NDArray[np.bool_], z: Complex) -> Complex:
         """Lay out the flat surface in the plane, by one solve with the analysed pattern.
@@ -102,36 +121,34 @@ def flat_metric(
     with phase("assembly"):
         pattern = BlockPattern(F, kept)
     cholesky: Cholesky | None = None
-    u = u.copy()
-    with phase("angles"):
-        alpha, broken = angles(scaled(lengths, F, u))
-        gradient = (flat - angle_sums(F, alpha, n))[kept]
+
+    def at(u: Real) -> tuple[Real, Real, NDArray[np.bool_]]:
+        with phase("angles"):
+            alpha, broken = angles(scaled(lengths, F, u))
+            return (flat - angle_sums(F, alpha, n))[kept], alpha, broken
+
+    def newton_step(cholesky: Cholesky, gradient: Real) -> Real:
+        step = np.zeros(n)
+        step[kept] = -cholesky.solve(gradient)
+        return step
+
+    gradient, alpha, broken = at(u)
     history = [float(np.abs(gradient).max(initial=0.0))]
     while history[-1] > tolerance and len(history) <= max_iterations:
         with phase("assembly"):
             A = pattern.block(half_cotangents_of(alpha, broken))
         cholesky = factor_like(cholesky, A)
-        step = np.zeros(n)
-        step[kept] = -cholesky.solve(gradient)
-        with phase("angles"):
-            slope = float(gradient @ step[kept])
-            share = 1.0
-            for _ in range(SHORTER):
-                there, lost = angles(scaled(lengths, F, u + share * step))
-                missing = (flat - angle_sums(F, there, n))[kept]
-                if float(missing @ step[kept]) <= -UPHILL * slope:
-                    break
-                share /= 2
-        u, alpha, broken, gradient = u + share * step, there, lost, missing
+        step = newton_step(cholesky, gradient)
+        slope = float(gradient @ step[kept])
+        u, gradient, alpha, broken = descended(at, u, step, step[kept], slope)
         history.append(float(np.abs(gradient).max()))
     if cholesky is not None:
         # One more step with the last factor, which takes the residual down to rounding for free.
-        step = np.zeros(n)
-        step[kept] = -cholesky.solve(gradient)
-        there, lost = angles(scaled(lengths, F, u + step))
-        off = float(np.abs((flat - angle_sums(F, there, n))[kept]).max(initial=0.0))
+        there = u + newton_step(cholesky, gradient)
+        missing, there_alpha, lost = at(there)
+        off = float(np.abs(missing).max(initial=0.0))
         if off < history[-1]:
-            u, alpha, broken, history[-1] = u + step, there, lost, off
+            u, alpha, broken, history[-1] = there, there_alpha, lost, off
     why = f"the angle sums are still off by up to {history[-1]:.2g} rad, tolerance {tolerance:g}"
     if broken.any():
         raise AlgorithmFailed(
@@ -145,13 +162,4 @@ def flat_metric(
         )
     if cholesky is None:  # already flat
         cholesky = Cholesky(pattern.block(half_cotangents_of(alpha, broken)))
-    return FlatMetric(
-        u,
-        scaled(lengths, F, u),
-        alpha,
-        history[-1],
-        tuple(history),
-        len(history),
-        pattern,
-        cholesky,
-    )
+    return FlatMetric(u, scaled(lengths, F, u), alpha, tuple(history), pattern, cholesky)

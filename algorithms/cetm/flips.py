@@ -26,7 +26,7 @@ from cembench.mesh.intrinsic import Triangulation
 from cembench.mesh.triangle_mesh import DiskMesh
 from cembench.registry import algorithm
 
-from .flat_metric import SHORTER, UPHILL
+from .flat_metric import descended
 from .triangle_map import K, disk_of_triangle
 
 if TYPE_CHECKING:
@@ -231,13 +231,8 @@ def _flattened(
             flips = T.flips
         step = np.zeros(n)
         step[free] = -factor.solve(gradient[free])
-        slope, share = float(gradient @ step), 1.0
-        for _ in range(SHORTER):
-            there, now, lost = missing(u + share * step)
-            if float(there @ step) <= -UPHILL * slope:
-                break
-            share /= 2
-        u, gradient, corners, broken = u + share * step, there, now, lost
+        slope = float(gradient @ step)
+        u, gradient, corners, broken = descended(missing, u, step, step, slope)
         best = float(np.abs(gradient / copies).max())
     raise AlgorithmFailed(
         f"the angle sums are still off by up to {best:.2g} rad after {most} Newton steps, "

@@ -69,13 +69,9 @@ def cetm_free(
     fixed[b] = True
     uv = flattened.laid_out(mesh.F, fixed, z)
     uv, folds = with_area_pi(mesh, uv, repair=repair)
-    extras = {
-        "curvature": flattened.residual,
-        "factorisations": flattened.factorisations,
-        "closing": closing,
-        "cross_ratios": cross_ratio_change(mesh, uv),
-    }
-    return Parameterization(uv, len(flattened.history) - 1, extras={**extras, **folds})
+    kept = {"closing": closing, "cross_ratios": cross_ratio_change(mesh, uv)}
+    extras = flattened.told | kept | folds
+    return Parameterization(uv, len(flattened.history) - 1, extras=extras)
 
 
 def cross_ratio_change(mesh: DiskMesh, uv: NDArray[np.complex128]) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from cembench.core.errors import MeshError, ParameterError
+from cembench.core.errors import ParameterError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -76,14 +76,12 @@ def cut(
         raise ParameterError("`along` and `through` exclude each other; give one of them.")
     mesh = load_surface(surface, (TriangleMesh,))
     path = Path(surface) if isinstance(surface, str | os.PathLike) else None
-    try:
+    with located(path):
         if along is None:
             return cut_open(mesh, through)
         if isinstance(along, str):
             return cut_along(mesh, edges_of_uv_seams(mesh, _uv_of(path, along, mesh)))
         return cut_along(mesh, edges_of_paths(mesh, along))
-    except MeshError as error:
-        raise located(error, path) from None
 
 
 def _uv_of(path: Path | None, along: str, mesh: TriangleMesh) -> NDArray[np.complex128]:

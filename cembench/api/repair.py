@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from cembench.api.settings import MOST_FACES
 from cembench.core.arguments import Range, checked
-from cembench.core.errors import MeshError
 
 if TYPE_CHECKING:
     import numpy as np
@@ -151,8 +150,6 @@ def repair(
     repaired = repair_soup(soup, path, **options)
     kinds = (TriangleMesh, DiskMesh, HoledMesh)  # every surface is of the first
     soups = [Soup.of_triangles(V, F, name=soup.name) for V, F in repaired.surfaces]
-    try:
+    with located(path):
         meshes = tuple(prepared(one, kinds).mesh for one in soups)
-    except MeshError as error:
-        raise located(error, path) from None
     return Repair(meshes, repaired.counts, repaired.origins, repaired.kept, soup.notices)

@@ -100,7 +100,8 @@ def repair(
 
 def print_steps(steps: Mapping[str, int]) -> None:
     """Print how often each step of a repair was applied."""
-    from cembench.mesh.repair import TITLES
+    from cembench.mesh.repair import Step
 
-    for step, count in steps.items():
-        out.print(f"{count:>9,}  {TITLES[step]}", style="" if count else "dim")
+    titles = {step.value: step.meaning for step in Step}
+    for name, count in steps.items():
+        out.print(f"{count:>9,}  {titles[name]}", style="" if count else "dim")

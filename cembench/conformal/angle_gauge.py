@@ -9,7 +9,6 @@ be the best.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.metrics import (
     SampledAngleError,
@@ -19,15 +18,15 @@ from cembench.conformal.metrics import (
 )
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.texel_density import texel_density_ratio
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
 
 #: The search begins with moves of the disk's centre by this hyperbolic length ...
 FIRST_MOVE = 0.3
 #: ... ends with moves by this, or where the error changes by this share of itself ...
-LAST_MOVE, LEAST_CHANGE = 0.01, 1e-4
+LAST_MOVE, MIN_CHANGE = 0.01, 1e-4
 #: ... and asks for the error of so many maps at most.
-MOST_MAPS = 100
+MAX_MAPS = 100
 #: Mean angle errors within this share of the least count as equal.
 EQUAL = 0.01
 
@@ -65,11 +64,11 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
 
     sampled, tried = SampledAngleError(mesh), list[tuple[float, tuple[float, ...]]]()
 
-    def error_at(move: NDArray[np.float64]) -> float:
+    def error_at(move: Real) -> float:
         tried.append((sampled(_moved(mesh, uv, move)), tuple(move.tolist())))
         return tried[-1][0]
 
-    ends = {"xatol": LAST_MOVE, "fatol": LEAST_CHANGE * sampled(uv), "maxfev": MOST_MAPS}
+    ends = {"xatol": LAST_MOVE, "fatol": MIN_CHANGE * sampled(uv), "maxfev": MAX_MAPS}
     options = {"initial_simplex": FIRST_MOVE * np.eye(3)[:, 1:], **ends}
     minimize(error_at, np.zeros(2), method="Nelder-Mead", options=options)
     areas, most = surface_areas(mesh), (1 + EQUAL) * min(tried)[0]
@@ -83,7 +82,7 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
     return uv
 
 
-def _moved(mesh: DiskMesh, uv: Complex, move: NDArray[np.float64]) -> Complex:
+def _moved(mesh: DiskMesh, uv: Complex, move: Real) -> Complex:
     """Return a map after the Moebius map that takes the point at `move` to the disk's centre.
 
     `move` has the point's hyperbolic coordinates: half its distance along its direction.

@@ -11,11 +11,10 @@ Computational Conformal Geometry, harmonic 1-forms).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.conjugate_functions import ConjugateFunctions, conjugate_functions
 from cembench.conformal.folds import in_order
-from cembench.core.arrays import Complex, Loop
+from cembench.core.arrays import Complex, Loop, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import HoledMesh
 
@@ -72,8 +71,7 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
             f"the hole's radius would be exp(-{modulus:.0f}), below what doubles hold: map the "
             "surface with a free boundary"
         )
-    image: Complex = np.exp(-modulus * u + 1j * v)
-    return image
+    return np.exp(-modulus * u + 1j * v)
 
 
 def _rims(pair: ConjugateFunctions, outer: Loop, hole: Loop) -> tuple[Loop, Loop]:
@@ -83,7 +81,7 @@ def _rims(pair: ConjugateFunctions, outer: Loop, hole: Loop) -> tuple[Loop, Loop
     return b[: len(outer) + 1], b[on_hole[0] : on_hole[0] + len(hole) + 1]
 
 
-def _increasing(angles: NDArray[np.float64]) -> NDArray[np.float64]:
+def _increasing(angles: Real) -> Real:
     """Return the nearest angles (k,) in order, for the vertices of a circle; the last closes it.
 
     They are evenly spaced where neighbours would be so far apart that the polygon misses the
@@ -95,5 +93,5 @@ def _increasing(angles: NDArray[np.float64]) -> NDArray[np.float64]:
     if arcs.min() > 0:
         return angles[:-1]
     circle = np.exp(1j * angles[:-1])
-    moved: NDArray[np.float64] = np.angle(in_order(circle) / circle)
+    moved: Real = np.angle(in_order(circle) / circle)
     return angles[:-1] + moved

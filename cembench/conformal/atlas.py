@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import scipy
 
 from cembench.conformal.metrics import METRICS, MapFigures, Metric, computed
 from cembench.conformal.planar import folded_triangles, signed_areas
 from cembench.core.arrays import Complex, Indices, Mask
+from cembench.mesh.topology import linked
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Metrics that do not apply to an atlas, whose outline is not meant to be round.
@@ -107,10 +107,8 @@ def _islands_and_seams(F: Indices, G: Indices) -> tuple[Indices, Indices]:
     twins = np.flatnonzero((edges[1:] == edges[:-1]).all(axis=1))
     one, other = order[twins], order[twins + 1]
     together = (in_plane[one] == in_plane[other]).all(axis=1)
-    pairs = triangle[one[together]], triangle[other[together]]
-    graph = scipy.sparse.coo_array((np.ones(len(pairs[0])), pairs), shape=(m, m))
-    _, island = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    return island.astype(np.int64), edges[twins[~together]]
+    _, island = linked(triangle[one[together]], triangle[other[together]], m)
+    return island, edges[twins[~together]]
 
 
 class AtlasFigures(MapFigures):

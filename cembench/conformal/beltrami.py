@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import double_areas, half_cotangents, laplacian_of_weights
 from cembench.conformal.planar import signed_areas
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.blocks import in_blocks
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
@@ -23,7 +23,7 @@ from cembench.core.errors import AlgorithmFailed
 COLLAPSED = 1e-8
 
 
-def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> Complex:
+def beltrami_coefficients(uv: Complex, F: Indices, V: Real) -> Complex:
     """Return mu (m,) of the map that takes each planar triangle ``uv[F]`` to ``V[F]``.
 
     V is (n, 2) or (n, 3). With the first fundamental form E, F, G of that map, ``mu = (E - G + 2 i
@@ -39,7 +39,7 @@ def beltrami_coefficients(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float
     return mu
 
 
-def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+def dilatations(uv: Complex, F: Indices, V: Real) -> Real:
     """Return the ratio of the largest to the smallest stretch of each triangle (m,), at least 1.
 
     Infinite if an image has no area. The map is that between ``uv[F]`` and ``V[F]``. The ratio is
@@ -50,7 +50,7 @@ def dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> ND
     return in_blocks(lambda some: _dilatations(uv, some, V), F)
 
 
-def _dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> NDArray[np.float64]:
+def _dilatations(uv: Complex, F: Indices, V: Real) -> Real:
     area = signed_areas(uv, F)
     E, G, mixed = _first_fundamental_form(uv, F, V, area)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
@@ -62,8 +62,8 @@ def _dilatations(uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64]) -> N
 
 
 def _first_fundamental_form(
-    uv: Complex, F: NDArray[np.int64], V: NDArray[np.float64], area: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    uv: Complex, F: Indices, V: Real, area: Real
+) -> tuple[Real, Real, Real]:
     """Return E, G, F of the map that takes triangles of these signed areas to ``V[F]``."""
     # The gradient of a corner's hat function is i times the opposite edge over twice the area.
     dx = np.zeros((len(F), V.shape[1]))
@@ -86,7 +86,7 @@ def unfolded(mu: Complex) -> Complex:
         return np.where(np.abs(mu) > 1, 1 / np.conj(mu), mu)
 
 
-def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArray[np.float64]:
+def generalised_weights(uv: Complex, F: Indices, mu: Complex) -> Real:
     """Return the edge weights (m, 3) for which maps with coefficients mu are harmonic.
 
     Weights belong to the opposite edges. They assemble (`laplacian_of_weights`) into the
@@ -107,9 +107,7 @@ def generalised_weights(uv: Complex, F: NDArray[np.int64], mu: Complex) -> NDArr
     return np.stack(weights, axis=1)
 
 
-def weights_of_map(
-    uv: Complex, F: NDArray[np.int64], mu: Complex, V: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def weights_of_map(uv: Complex, F: Indices, mu: Complex, V: Real) -> Real:
     """Return `generalised_weights` for the coefficients mu of the map from ``uv[F]`` to ``V[F]``.
 
     Dirichlet's energy is conformally invariant, so these are half the cotangents of V for any uv.
@@ -124,10 +122,7 @@ def weights_of_map(
 
 
 def linear_beltrami_solver(
-    F: NDArray[np.int64],
-    weights: NDArray[np.float64],
-    fixed: NDArray[np.int64],
-    values: NDArray[Any],
+    F: Indices, weights: Real, fixed: Indices, values: NDArray[Any]
 ) -> NDArray[Any]:
     """Return the map with given Beltrami coefficients and given values at some vertices.
 

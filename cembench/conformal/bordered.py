@@ -15,7 +15,7 @@ from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.planar import polygon_area
 from cembench.conformal.ring_order import ring_pays
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.linear_algebra.cholesky import LARGEST_DENSE, Cholesky, shows_trailing_block
@@ -71,7 +71,7 @@ class BorderedLaplacian:
         self,
         mesh: TriangleMesh,
         L: scipy.sparse.sparray,
-        loops: Sequence[NDArray[np.int64]],
+        loops: Sequence[Indices],
         *,
         iterations: int = 0,
     ) -> None:
@@ -93,13 +93,12 @@ class BorderedLaplacian:
         leading = len(self.interior) - (len(self.beside) if self._ringed else 0)
         self._whole = Cholesky(pinned, leading=leading, lower=True)
 
-    def _ring(self, L: scipy.sparse.sparray, iterations: int) -> tuple[NDArray[np.int64], bool]:
+    def _ring(self, L: scipy.sparse.sparray, iterations: int) -> tuple[Indices, bool]:
         """Which interior vertices get values, and whether these come last in the interior."""
         too_long = len(self.boundary) > LARGEST_DENSE
         if not iterations or too_long or not shows_trailing_block():
             return self.interior, False
-        near = np.zeros(L.shape[0], dtype=bool)
-        near[by_rows(L)[self.boundary].indices] = True
+        near = marked(L.shape[0], by_rows(L)[self.boundary].indices)
         near[self.boundary] = False
         ring = np.flatnonzero(near)
         sizes = len(self.interior), len(ring), len(self.boundary)
@@ -107,7 +106,7 @@ class BorderedLaplacian:
         return ring, short and ring_pays(*sizes, iterations)
 
     @cached_property
-    def _rows_beside(self) -> NDArray[np.int64] | None:
+    def _rows_beside(self) -> Indices | None:
         """Positions of `beside` in the interior; None if it is all of it."""
         if len(self.beside) == len(self.interior):
             return None
@@ -158,14 +157,13 @@ class BorderedLaplacian:
             return self._extended(f_b, self._rows_beside)
         return self.solve_interior(-(self._L_ib @ f_b))
 
-    def _extended(self, f: Complex, rows: NDArray[np.int64] | None = None) -> Complex:
+    def _extended(self, f: Complex, rows: Indices | None = None) -> Complex:
         """Return the harmonic values before f, which holds those of the last vertices in order.
 
         All of them, or those in some rows.
         """
         # Constants are harmonic: so the last vertex can be taken to 0 and back.
-        inside: Complex = self._whole.extended((f - f[-1])[:-1], rows) + f[-1]
-        return inside
+        return self._whole.extended((f - f[-1])[:-1], rows) + f[-1]
 
     def _needs_all_inside(self, what: str) -> None:
         """Refuse what would take the other interior for all of it."""

@@ -22,12 +22,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.circle_domain import CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.trust_region import newton_step
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
@@ -36,12 +35,12 @@ MODES = 8
 #: A predicted decrease below this, times the number of boundary vertices, is rounding.
 ROUNDING = 1e-16
 #: With more arcs than this held at their minimal length, the boundary is too crowded.
-MOST_HELD = 64
+MAX_HELD = 64
 #: Relative residual at which CG ends a Newton step. Products are cheap, and with coarser steps
 #: crowded circles need ten times as many.
 ACCURACY = 0.01, 0.03
 #: Curvatures of radii and centres are at least this share of the largest one.
-LEAST_CURVATURE = 1e-12
+MIN_CURVATURE = 1e-12
 #: Tolerance for sum w z = 0, and the maximal number of Newton steps for it.
 GAUGE_ACCURACY, GAUGE_STEPS = 1e-13, 50
 
@@ -60,7 +59,7 @@ class Minimum:
         The gradient's norm, whose square is about twice what E_C could still decrease.
     reason : str
         Why the iteration ended: "gradient" (it is small enough), "rounding" (no further decrease in
-        floating point), "iterations", or "crowded" (more than `MOST_HELD` arcs at their minimal
+        floating point), "iterations", or "crowded" (more than `MAX_HELD` arcs at their minimal
         length; `gradient` is then NaN).
     products : int
         Number of products with the Hessian.
@@ -99,7 +98,7 @@ def minimise(
     model = EnergyModel(S, in_gauge(start, weights), weights)
     energies, radius, products = [model.energy], 1.0, 0
     while True:
-        if len(model.held) > MOST_HELD:
+        if len(model.held) > MAX_HELD:
             reason = "crowded"
             break
         if model.gradient_norm**2 <= 2 * tolerance * model.energy:
@@ -317,7 +316,7 @@ class EnergyModel:
         assert self._holes is not None
         block = np.real(np.conj(self._holes).T @ self.residual_of(self._holes))
         values, vectors = np.linalg.eigh((block + block.T) / 2)
-        values = np.maximum(values, LEAST_CURVATURE * values[-1])
+        values = np.maximum(values, MIN_CURVATURE * values[-1])
         return np.asarray(vectors / values @ vectors.T)
 
     def _unconstrained(self, g: Real) -> Real:
@@ -345,10 +344,10 @@ class EnergyModel:
         return c, preconditioned, np.asarray(np.linalg.inv(c.T @ preconditioned), dtype=np.float64)
 
     @cached_property
-    def held(self) -> NDArray[np.int64]:
+    def held(self) -> Indices:
         """The arcs that have their minimal length and would become shorter downhill."""
         rims, B = self.domain.rims, len(self.domain.arcs)
-        short = self.domain.shortest(MOST_HELD)
+        short = self.domain.shortest(MAX_HELD)
         held, constraints = short[:0], self._gauge
         while len(short):
             downhill = -_projected(self._free_uphill, constraints)[:B]
@@ -357,12 +356,12 @@ class EnergyModel:
             if not len(more):
                 break
             held = np.union1d(held, more)  # others may become shorter once these are held
-            if len(held) > MOST_HELD:
+            if len(held) > MAX_HELD:
                 break
             constraints = self._keeping(held)
         return held
 
-    def _keeping(self, held: NDArray[np.int64]) -> tuple[Real, Real, Real]:
+    def _keeping(self, held: Indices) -> tuple[Real, Real, Real]:
         """The constraints of the gauge, and those that keep the length of some arcs."""
         if not len(held):
             return self._gauge

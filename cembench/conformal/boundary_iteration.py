@@ -6,11 +6,10 @@ from collections.abc import Callable
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.gauge import middle_triangle
 from cembench.conformal.planar import backward_arcs, polygon_area
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
@@ -19,9 +18,7 @@ from cembench.core.errors import AlgorithmFailed
 Stop: TypeAlias = Literal["drop", "change"]
 
 
-def pole(
-    V: Real, F: NDArray[np.int64], triangle: int | None = None
-) -> tuple[NDArray[np.int64], Complex]:
+def pole(V: Real, F: Indices, triangle: int | None = None) -> tuple[Indices, Complex]:
     """Return the right-hand side that puts a pole at a triangle in the middle (Eq. 14).
 
     V is (n, 2 or 3). By default the triangle is the one whose barycentre is nearest to the mean
@@ -42,7 +39,7 @@ def pole(
 
 
 def pole_start(
-    V: Real, F: NDArray[np.int64], solve: Callable[[Complex], Complex], triangle: int | None = None
+    V: Real, F: Indices, solve: Callable[[Complex], Complex], triangle: int | None = None
 ) -> Complex:
     """Return the boundary values of the map with a pole in the middle (Eqs. 13, 14, 18).
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 
 from cembench.conformal.circle_capacities import circle_capacities
@@ -21,7 +20,7 @@ from cembench.conformal.conjugate_functions import conjugate_functions
 from cembench.conformal.harmonic import edge_lengths, harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.planar import fitted_circle, polygon_area
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
 
@@ -47,7 +46,7 @@ class Certificate:
 
     """
 
-    corners: NDArray[np.int64]
+    corners: Indices
     upper: float
     conjugate: float
 
@@ -120,13 +119,13 @@ class HolesCertificate:
 
     """
 
-    corners: NDArray[np.int64]
+    corners: Indices
     sizes: tuple[int, ...]
-    upper: NDArray[np.float64]
-    conjugate: NDArray[np.float64]
+    upper: Real
+    conjugate: Real
 
     @property
-    def lower(self) -> NDArray[np.float64]:
+    def lower(self) -> Real:
         """A lower bound of the capacities (k, k), as a quadratic form."""
         return np.asarray(np.linalg.inv(self.conjugate), dtype=np.float64)
 
@@ -135,7 +134,7 @@ class HolesCertificate:
         """The largest ratio of both bounds, less 1: the discretisation error."""
         return _largest_ratio(self.upper, self.lower) - 1
 
-    def of_map(self, z: Complex) -> tuple[NDArray[np.float64], float]:
+    def of_map(self, z: Complex) -> tuple[Real, float]:
         """Return the capacities (k, k) of the unit disk without the circles of a map, and their
         error; z (b,) are the images of `corners`.
 
@@ -201,7 +200,7 @@ def _beside(outside: float, own: float) -> str:
 ROUND = 1e-6
 
 
-def _largest_ratio(A: NDArray[np.float64], B: NDArray[np.float64]) -> float:
+def _largest_ratio(A: Real, B: Real) -> float:
     """Return the largest a^T A a / a^T B a of two symmetric matrices, the second one positive."""
     from scipy.linalg import eigh  # imported here: rarely needed
 
@@ -248,7 +247,7 @@ def certify_holes(mesh: HoledMesh, outer: int | None = None) -> HolesCertificate
     return HolesCertificate(np.concatenate(holes), sizes, pair.capacity, periods)
 
 
-def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certificate:
+def certify(mesh: DiskMesh, corners: Indices | None = None) -> Certificate:
     """Enclose the modulus of a surface with four boundary points by two harmonic functions.
 
     `corners` (4,) are boundary vertices in order (default: those of :func:`four_points`).
@@ -284,14 +283,14 @@ def certify(mesh: DiskMesh, corners: NDArray[np.int64] | None = None) -> Certifi
     return Certificate(chosen, _energy(L, sides[0], sides[2]), _energy(L, sides[1], sides[3]))
 
 
-def _energy(L: sparse.csc_array, low: NDArray[np.int64], high: NDArray[np.int64]) -> float:
+def _energy(L: sparse.csc_array, low: Indices, high: Indices) -> float:
     """Return the integral of |grad u|^2 for the u that is 0 on one side and 1 on the other."""
     fixed = np.concatenate([low, high])
     u = harmonic_extension(L, fixed, np.repeat([0.0, 1.0], [len(low), len(high)]))
     return float(u @ (L @ u))
 
 
-def four_points(mesh: DiskMesh) -> NDArray[np.int64]:
+def four_points(mesh: DiskMesh) -> Indices:
     """Return the boundary vertices at :data:`SHARES` of its length, starting at the farthest one.
 
     Raises

@@ -12,13 +12,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.moebius import Moebius
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real
 
 #: Minimal share of its initial length that every arc keeps, so that no vertices meet.
-LEAST_SHARE = 0.1
+MIN_SHARE = 0.1
 #: Arcs below this share of the mean arc are crowded: they hardly change the energy, and the inexact
 #: steps of a minimiser leave them to chance.
 RESOLVED = 1e-2
@@ -61,7 +60,7 @@ class BoundaryLoops:
         return np.repeat(np.arange(len(self.sizes)), self.sizes)
 
     @cached_property
-    def on_outer(self) -> NDArray[np.bool_]:
+    def on_outer(self) -> Mask:
         """Whether each vertex is on the outer circle, shape (B,)."""
         return self.loop == self.outer
 
@@ -124,7 +123,7 @@ class CircleDomain:
     def of_arcs(cls, arcs: Real) -> CircleDomain:
         """Return the unit disk with positive arcs (B,) in these proportions, starting at 1."""
         arcs = arcs * (2 * np.pi / arcs.sum())
-        rims, least = BoundaryLoops((len(arcs),)), LEAST_SHARE * arcs
+        rims, least = BoundaryLoops((len(arcs),)), MIN_SHARE * arcs
         return cls(rims, arcs, np.zeros(1), np.zeros(1, complex), np.ones(1), least)
 
     @property

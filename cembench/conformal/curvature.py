@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import cotangent_laplacian, half_cotangents
+from cembench.core.arrays import Indices, Real
 from cembench.mesh import topology
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
-def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
+def mean_curvature(mesh: TriangleMesh) -> Real:
     """Return the mean curvature at each vertex: the mean of both principal curvatures.
 
     Shape (n,), in one over the unit of V; positive where the surface bulges outwards (1 on a unit
@@ -32,7 +32,7 @@ def mean_curvature(mesh: TriangleMesh) -> NDArray[np.float64]:
     return _continued_to_boundary(mesh, H)
 
 
-def mixed_vertex_areas(mesh: TriangleMesh) -> NDArray[np.float64]:
+def mixed_vertex_areas(mesh: TriangleMesh) -> Real:
     """Return the mixed Voronoi area of each vertex (n,) (Meyer et al. 2003)."""
     a, b, c = (mesh.V[mesh.F[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -41,9 +41,7 @@ def mixed_vertex_areas(mesh: TriangleMesh) -> NDArray[np.float64]:
     return np.asarray(owned, dtype=np.float64)
 
 
-def _mixed_areas(
-    V: NDArray[np.float64], F: NDArray[np.int64], areas: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _mixed_areas(V: Real, F: Indices, areas: Real) -> Real:
     """Return the part of each triangle that belongs to each of its corners, shape (m, 3).
 
     This is the Voronoi part; an obtuse triangle gives half to its obtuse corner and a quarter to
@@ -58,7 +56,7 @@ def _mixed_areas(
     return np.where(obtuse.any(axis=1, keepdims=True), cut, voronoi)
 
 
-def _continued_to_boundary(mesh: TriangleMesh, H: NDArray[np.float64]) -> NDArray[np.float64]:
+def _continued_to_boundary(mesh: TriangleMesh, H: Real) -> Real:
     """Give boundary vertices the mean of their interior neighbours."""
     inside = np.zeros(mesh.n)
     inside[mesh.interior] = 1.0

@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real
 from cembench.mesh.gluing import edges_of_half_edges
 
 #: Half the cotangent of 60 degrees, used for lengths that form no triangle.
@@ -23,7 +22,7 @@ def scaled(lengths: Real, F: Indices, u: Real) -> Real:
     return np.asarray(lengths * np.exp((corners.sum(axis=1, keepdims=True) - corners) / 2))
 
 
-def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
+def angles(lengths: Real) -> tuple[Real, Mask]:
     """Return the angles (m, 3) in radians, and which triangles are broken (m,).
 
     If one side is at least as long as the other two together, its opposite angle is pi and the
@@ -44,7 +43,7 @@ def angles(lengths: Real) -> tuple[Real, NDArray[np.bool_]]:
     return radians, broken
 
 
-def half_cotangents_of(angles: Real, broken: NDArray[np.bool_]) -> Real:
+def half_cotangents_of(angles: Real, broken: Mask) -> Real:
     """Return half the cotangent of each angle (m, 3); of 60 degrees for broken triangles."""
     with np.errstate(divide="ignore"):
         weights = 0.5 / np.tan(angles)
@@ -86,7 +85,7 @@ class BlockPattern:
 
     """
 
-    def __init__(self, F: Indices, kept: NDArray[np.bool_]) -> None:
+    def __init__(self, F: Indices, kept: Mask) -> None:
         ends, self._edge, _ = edges_of_half_edges(F)
         self._ends, self.kept, self._n = ends, kept, len(kept)
         number = np.cumsum(kept) - 1
@@ -116,8 +115,8 @@ class BlockPattern:
         return self._filled(-w[self._inside], self._degrees(w))
 
     def dirichlet(
-        self, weights: Real, fixed: NDArray[np.bool_], f: NDArray[np.complex128]
-    ) -> tuple[scipy.sparse.csc_array, NDArray[np.complex128]]:
+        self, weights: Real, fixed: Mask, f: Complex
+    ) -> tuple[scipy.sparse.csc_array, Complex]:
         """Return A and b of A x = b for the harmonic map that is f (n,) at fixed vertices (n,).
 
         All vertices that are not kept are fixed. Kept vertices that are fixed have the equation x =

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import laplacian
-from cembench.core.arrays import Real
+from cembench.core.arrays import Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -32,12 +32,12 @@ class DoubledSurface:
 
     """
 
-    F: NDArray[np.int64]
-    mirror: NDArray[np.int64]
+    F: Indices
+    mirror: Indices
     size: int
 
     @property
-    def half(self) -> NDArray[np.int64]:
+    def half(self) -> Indices:
         """The surface's own vertex of each vertex of the double, int64 (size,)."""
         return self.on_both(np.arange(len(self.mirror)))
 

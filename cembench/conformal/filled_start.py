@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cembench.conformal.boundary_energy import EnergyModel
-from cembench.conformal.circle_domain import LEAST_SHARE, BoundaryLoops, CircleDomain
+from cembench.conformal.circle_domain import MIN_SHARE, BoundaryLoops, CircleDomain
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.patches import disk_patch
 from cembench.conformal.planar import backward_arcs, polygon_area
@@ -25,7 +25,7 @@ ROOM = 0.45
 #: If a circle is smaller than this, other loops are tried as the outer one.
 CROWDED = 1e-3
 #: Of more holes, which are tried takes longer than the map; so these many, of all sizes, are.
-ALL_TRIED, MOST_TRIED = 32, 8
+ALL_TRIED, MAX_TRIED = 32, 8
 #: Minimal share of the mean arc for arcs of a disk that fills a hole: with shorter ones its energy
 #: suffers from cancellation, and a start does not depend on them.
 PATCH_SHARE = 1e-4
@@ -43,7 +43,7 @@ def widest_start(S: DirichletToNeumann, seen: Real, lengths: Sequence[Real]) -> 
         return start
     holes = np.argsort(start.radii[1:], kind="stable") + 1
     holes = (
-        holes[np.linspace(0, len(holes) - 1, MOST_TRIED).round().astype(int)]
+        holes[np.linspace(0, len(holes) - 1, MAX_TRIED).round().astype(int)]
         if len(holes) > ALL_TRIED
         else holes
     )
@@ -135,11 +135,11 @@ def _fitted(rims: BoundaryLoops, arcs: Real, outside: Real, to_holes: Real) -> C
     radii = np.abs(similarities) / (4 * np.pi)
     radii[rims.outer] = 1
     radii[rims.holes] = _radii_without_overlap(centres[rims.holes], radii[rims.holes])
-    return CircleDomain(rims, arcs, np.angle(similarities), centres, radii, LEAST_SHARE * arcs)
+    return CircleDomain(rims, arcs, np.angle(similarities), centres, radii, MIN_SHARE * arcs)
 
 
 #: Harmonic measure per length is raised to at least this share of its largest value.
-LEAST_DENSITY = 1e-12
+MIN_DENSITY = 1e-12
 
 
 def arcs_of_measure(measure: Real, lengths: Real) -> Real:
@@ -150,7 +150,7 @@ def arcs_of_measure(measure: Real, lengths: Real) -> Real:
     edge.
     """
     around = (lengths + np.roll(lengths, 1)) / 2
-    density = np.maximum(measure / around, LEAST_DENSITY * np.max(measure / around))
+    density = np.maximum(measure / around, MIN_DENSITY * np.max(measure / around))
     return lengths * (density + np.roll(density, -1))
 
 

@@ -12,12 +12,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.planar import backward_arcs, folded_triangles, winding_words
 from cembench.conformal.untangling import untangled
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real, marked, numbered
 from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.topology import vertex_graph
@@ -32,7 +31,7 @@ HEIGHT = 4 * np.finfo(float).eps
 #: Changes of an angle up to this size are ignored.
 MOVED = 1e-14
 #: Largest share of the boundary's arcs that may run backward.
-MOST_BACKWARD = 0.1
+MAX_BACKWARD = 0.1
 #: Numbers of rings of vertices around the folds that are laid out again, in this order.
 RINGS = (1, 2, 4, 8, 16)
 
@@ -101,15 +100,13 @@ def interior_without_folds(
         return z, 0
     rounds = 0
     with phase("folds"):
-        held = np.zeros(mesh.n, dtype=bool)
-        held[np.concatenate(mesh.loops)] = True
+        held = marked(mesh.n, np.concatenate(mesh.loops))
         graph = vertex_graph(mesh.F, mesh.n)
         for count in rings:
             folded = folded[~held[mesh.F[folded]].all(axis=1)]
             if not len(folded):
                 break
-            near = np.zeros(mesh.n, dtype=bool)
-            near[mesh.F[folded]] = True
+            near = marked(mesh.n, mesh.F[folded])
             for _ in range(count):
                 near |= graph @ near.astype(np.float64) > 0
             z = _accepted(mesh, z, *untangled(mesh, z, near & ~held, graph))
@@ -118,9 +115,7 @@ def interior_without_folds(
     return z, rounds
 
 
-def _accepted(
-    mesh: TriangleMesh, before: Complex, after: Complex, patch: NDArray[np.int64]
-) -> Complex:
+def _accepted(mesh: TriangleMesh, before: Complex, after: Complex, patch: Indices) -> Complex:
     """Return the repaired map, with patches that still have folds put back."""
     folded = np.unique(patch[folded_triangles(after, mesh.F)])
     back = np.unique(mesh.F[np.isin(patch, folded[folded >= 0])])
@@ -129,7 +124,7 @@ def _accepted(
     return accepted
 
 
-def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
+def _folded(mesh: TriangleMesh, z: Complex) -> Indices:
     """Return the folded triangles, in the phase "folds"."""
     with phase("folds"):
         return folded_triangles(z, mesh.F)
@@ -138,8 +133,7 @@ def _folded(mesh: TriangleMesh, z: Complex) -> NDArray[np.int64]:
 def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
     """Return the boundary in order, such that no triangle between its vertices has zero area."""
     ordered = in_order(circle)
-    place = np.full(mesh.n, -1)
-    place[mesh.boundary] = np.arange(len(circle))
+    place = numbered(mesh.n, mesh.boundary)
     corners = place[mesh.F]
     corners = corners[(corners >= 0).all(axis=1)]
     flat = corners[folded_triangles(ordered, corners)]
@@ -161,7 +155,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     ------
     AlgorithmFailed
         The points do not go around the circle once and counter-clockwise, or more than the share
-        `MOST_BACKWARD` of their arcs runs backward.
+        `MAX_BACKWARD` of their arcs runs backward.
 
     """
     arcs = np.angle(np.roll(circle, -1) / circle)
@@ -174,7 +168,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     moved = np.abs(turned) > MOVED
     ordered = np.roll(np.where(moved, cut[0] * np.exp(1j * (angles + turned)), cut), first)
     turns = round(arcs.sum() / (2 * np.pi))
-    scrambled = backward_arcs(circle) > MOST_BACKWARD * len(circle)
+    scrambled = backward_arcs(circle) > MAX_BACKWARD * len(circle)
     if turns != 1:
         raise AlgorithmFailed(
             f"the boundary {winding_words(turns)}; it must go around it once, counter-clockwise, "
@@ -183,7 +177,7 @@ def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
     if scrambled or backward_arcs(ordered):
         raise AlgorithmFailed(
             f"{backward_arcs(circle)} of the boundary's {len(circle)} arcs go backward or have no "
-            f"length, more than the share of {MOST_BACKWARD:.0%} whose order can be repaired"
+            f"length, more than the share of {MAX_BACKWARD:.0%} whose order can be repaired"
         )
     return ordered
 

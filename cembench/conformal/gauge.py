@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import edge_lengths
 from cembench.conformal.laplacian import double_areas
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.blocks import in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -20,7 +19,7 @@ GAUGE_STEPS, GAUGE_ACCURACY = 200, 1e-12
 Gauge = Literal["boundary", "triangle", "area"]
 
 
-def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: NDArray[np.int64]) -> Real:
+def gauge_measure(mesh: TriangleMesh, gauge: Gauge, outer: Indices) -> Real:
     """Return the non-negative weights (n,), with sum 1, of the measure that is centred.
 
     `outer` is the outer boundary loop.
@@ -65,11 +64,11 @@ def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
     )
 
 
-def middle_triangle(V: Real, F: NDArray[np.int64]) -> NDArray[np.int64]:
+def middle_triangle(V: Real, F: Indices) -> Indices:
     """Return the corners of the triangle nearest to the mean vertex; V is (n, 2 or 3)."""
     middle = 3 * V.mean(axis=0)
 
-    def squared_distances(some: NDArray[np.int64]) -> Real:
+    def squared_distances(some: Indices) -> Real:
         a, b, c = (V.take(some[:, k], axis=0) for k in range(3))
         off = a + b + c - middle
         return np.asarray(np.einsum("td,td->t", off, off))

@@ -10,18 +10,19 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import by_rows
+from cembench.core.arrays import Complex, Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 
-def edge_lengths(mesh: TriangleMesh, loop: NDArray[np.int64]) -> NDArray[np.float64]:
+def edge_lengths(mesh: TriangleMesh, loop: Indices) -> Real:
     """Return the edge length from each vertex of a boundary loop to the next, (k,)."""
     corners = mesh.V[loop]
     return np.linalg.norm(np.roll(corners, -1, axis=0) - corners, axis=1)
 
 
-def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
+def arc_length_circle(mesh: DiskMesh) -> Complex:
     """Return boundary positions on the unit circle, spaced in proportion to edge length.
 
     Parameters
@@ -48,7 +49,7 @@ def arc_length_circle(mesh: DiskMesh) -> NDArray[np.complex128]:
 
 
 def harmonic_extension(
-    L: scipy.sparse.csc_array, fixed: NDArray[np.int64], values: NDArray[Any]
+    L: scipy.sparse.csc_array, fixed: Indices, values: NDArray[Any]
 ) -> NDArray[Any]:
     """Return the map that is harmonic for L and has these values at the fixed vertices (Eq. 10).
 
@@ -95,10 +96,9 @@ class HarmonicExtension:
     errors as for :func:`harmonic_extension`.
     """
 
-    def __init__(self, L: scipy.sparse.csc_array, fixed: NDArray[np.int64]) -> None:
+    def __init__(self, L: scipy.sparse.csc_array, fixed: Indices) -> None:
         self._L, self._fixed = L, fixed
-        free = np.ones(L.shape[0], dtype=bool)
-        free[fixed] = False
+        free = ~marked(L.shape[0], fixed)
         self._free = np.flatnonzero(free)
 
     @cached_property

@@ -19,14 +19,14 @@ from cembench.conformal.boundary_modes import InverseByModes
 from cembench.conformal.dirichlet_to_neumann import DirichletToNeumann
 from cembench.conformal.laplacian import by_rows
 from cembench.conformal.ring_order import ENTRIES, OPERATIONS_AN_ENTRY
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real, marked
 from cembench.core.clock import phase
 from cembench.linear_algebra.cholesky import Cholesky, keeps_factors
 from cembench.linear_algebra.lower_triangle import permuted_lower
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Shorter boundaries are always kept last: their dense triangle is small, and serves any step.
-LEAST_BOUNDARY = 500
+MIN_BOUNDARY = 500
 #: The boundary's rows of a factor take so many operations, times B^2 sqrt(n): the separators that
 #: they meet have about sqrt(n) vertices.
 ROWS = 4.7
@@ -61,7 +61,7 @@ def solves_pay(interior: int, boundary: int) -> bool:
     False
 
     """
-    if boundary <= LEAST_BOUNDARY or interior < 2 or not keeps_factors():
+    if boundary <= MIN_BOUNDARY or interior < 2 or not keeps_factors():
         return False
     spared = boundary**3 / 3 + ROWS * boundary**2 * math.sqrt(interior)
     one_pass = ENTRIES * interior * math.log2(interior) * OPERATIONS_AN_ENTRY
@@ -102,7 +102,7 @@ class InteriorLaplacian:
         self,
         mesh: TriangleMesh,
         L: scipy.sparse.csc_array,
-        boundary: NDArray[np.int64],
+        boundary: Indices,
         measure: Real,
         *,
         by_position: bool = False,
@@ -162,16 +162,13 @@ class InteriorLaplacian:
         return np.asarray(self.L_bb @ f + self._L_bn @ self.harmonic_near(f))
 
 
-def _sparse_columns(
-    inside: Real, L_bi: scipy.sparse.csr_array
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_], NDArray[np.int64]]:
+def _sparse_columns(inside: Real, L_bi: scipy.sparse.csr_array) -> tuple[Mask, Mask, Indices]:
     """Return which columns (n_i, k) have many entries, which have few, and the rows of interest.
 
     These rows are the boundary's neighbours and those of the columns with few entries, fewer than
     there are neighbours.
     """
-    wanted = np.zeros(len(inside), dtype=bool)
-    wanted[L_bi.indices] = True
+    wanted = marked(len(inside), L_bi.indices)
     entries = np.count_nonzero(inside, axis=0)
     few = (entries > 0) & (entries <= np.count_nonzero(wanted))
     wanted |= inside[:, few].any(axis=1)

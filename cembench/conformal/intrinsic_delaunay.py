@@ -11,9 +11,8 @@ the opposite edge.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Mask, Real, marked
 from cembench.mesh.flips import Independence, area_of_sides, distance_across
 from cembench.mesh.gluing import opposite_edge_ends, partners
 
@@ -22,7 +21,7 @@ ROUNDING = 1e-10
 #: The corner after each one of a triangle, and round again.
 NEXT = np.array([1, 2, 0, 1])
 #: Maximal rounds of flips; a real surface takes about ten.
-MOST_ROUNDS = 1000
+MAX_ROUNDS = 1000
 #: Up to this share of obtuse angles, the edges opposite to them are examined alone first.
 FEW = 0.02
 
@@ -79,8 +78,7 @@ def _flipped_near(
     wrong: Indices, F: Indices, lengths: Real, weights: Real
 ) -> tuple[Indices, Real, Real] | None:
     """Flip with only the triangles near these at hand; None where flips lead farther away."""
-    inside = np.zeros(int(F.max()) + 1, dtype=bool)
-    inside[F[wrong]] = True
+    inside = marked(int(F.max()) + 1, F[wrong])
     inside[F[_with_one_of(inside, F)]] = True
     near = np.flatnonzero(_with_one_of(inside, F))
     part = _Corners(F[near], lengths[near], weights[near])
@@ -91,13 +89,13 @@ def _flipped_near(
     return F, lengths, weights
 
 
-def _with_one_of(inside: NDArray[np.bool_], F: Indices) -> NDArray[np.bool_]:
+def _with_one_of(inside: Mask, F: Indices) -> Mask:
     """Return a mask (m,) of the triangles with a vertex of these."""
     first, second, third = inside.take(F).T
     return np.asarray(first | second | third)
 
 
-def opposite_to_obtuse(F: Indices, weights: Real) -> NDArray[np.bool_]:
+def opposite_to_obtuse(F: Indices, weights: Real) -> Mask:
     """Return a mask (m,) of triangles that has both at every edge opposite to an obtuse angle.
 
     Only these edges may not be Delaunay. `weights` (m, 3) have the signs of the cotangents.
@@ -129,10 +127,10 @@ class _Corners:
         """Return the corners, one at least of every edge that may have to be flipped."""
         return np.flatnonzero(self.weight < 0)
 
-    def flip_all(self, inside: NDArray[np.bool_] | None = None) -> bool:
+    def flip_all(self, inside: Mask | None = None) -> bool:
         """Flip until no edge is wrong; False, and not at the end, at a vertex not `inside`."""
         waiting = self.obtuse()
-        for _ in range(MOST_ROUNDS):
+        for _ in range(MAX_ROUNDS):
             wrong = self.not_delaunay(waiting)
             if not len(wrong):
                 break
@@ -156,7 +154,7 @@ class _Corners:
         lower = np.sort(np.minimum(corners, twins)[wrong], kind="stable")
         return lower[np.diff(lower, prepend=-1) > 0]
 
-    def sharing_no_triangle(self, corners: Indices) -> NDArray[np.bool_]:
+    def sharing_no_triangle(self, corners: Indices) -> Mask:
         """Whether, of these edges one after another, no earlier one has the same triangle."""
         return self._apart(corners // 3, self.twin[corners] // 3)
 

@@ -8,18 +8,16 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.intrinsic_delaunay import intrinsic_delaunay, opposite_to_obtuse
+from cembench.core.arrays import Indices, Real
 from cembench.core.blocks import blocks, in_blocks
 from cembench.core.clock import phase
 from cembench.mesh.gluing import SLOTS, opposite_edge_ends, twins_of_half_edges
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
-def corner_products(
-    V: NDArray[np.float64], F: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def corner_products(V: Real, F: Indices) -> tuple[Real, Real]:
     """Return the dot products (m, 3) of the edges at each corner, and twice the areas (m,).
 
     V is (n, d) with d = 2 or 3; the corner ``[t, c]`` is at vertex ``F[t, c]``. Areas are unsigned.
@@ -30,17 +28,13 @@ def corner_products(
     return dots, double_area
 
 
-def _opposite_edges(
-    V: NDArray[np.float64], F: NDArray[np.int64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _opposite_edges(V: Real, F: Indices) -> tuple[Real, Real, Real]:
     """The edges (m, d) opposite to the corners 0, 1, 2."""
     a, b, c = (V.take(F[:, k], axis=0) for k in range(3))
     return c - b, a - c, b - a
 
 
-def _products(
-    e0: NDArray[np.float64], e1: NDArray[np.float64], e2: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _products(e0: Real, e1: Real, e2: Real) -> tuple[Real, Real]:
     dots = np.empty((len(e0), 3))
     for k, (p, q) in enumerate(((e1, e2), (e2, e0), (e0, e1))):
         np.einsum("td,td->t", p, q, out=dots[:, k])
@@ -48,12 +42,12 @@ def _products(
     return dots, _double_areas(e1, e2)
 
 
-def double_areas(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+def double_areas(V: Real, F: Indices) -> Real:
     """Return twice the area of each triangle (m,), unsigned; V is (n, 2 or 3)."""
     return in_blocks(lambda some: _double_areas(*_opposite_edges(V, some)[1:]), F)
 
 
-def _double_areas(e1: NDArray[np.float64], e2: NDArray[np.float64]) -> NDArray[np.float64]:
+def _double_areas(e1: Real, e2: Real) -> Real:
     # Lagrange's identity through the dot products alone would cancel on slivers.
     if e1.shape[1] == 2:
         return np.abs(e1[:, 0] * e2[:, 1] - e1[:, 1] * e2[:, 0])
@@ -63,7 +57,7 @@ def _double_areas(e1: NDArray[np.float64], e2: NDArray[np.float64]) -> NDArray[n
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
-def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+def half_cotangents(V: Real, F: Indices) -> Real:
     """Return half the cotangent of each corner's angle, shape (m, 3), dimensionless.
 
     V and corners as for :func:`corner_products`.
@@ -73,9 +67,7 @@ def half_cotangents(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.
     return dots
 
 
-def laplacian_of_weights(
-    F: NDArray[np.int64], weights: NDArray[np.float64], n: int
-) -> scipy.sparse.csc_array:
+def laplacian_of_weights(F: Indices, weights: Real, n: int) -> scipy.sparse.csc_array:
     """Return the Laplacian of `weights` (m, 3), for the edges opposite to the corners.
 
     The weights of the two triangles of an edge are added.
@@ -93,7 +85,7 @@ def laplacian_of_weights(
     )
 
 
-def cotangent_laplacian(V: NDArray[np.float64], F: NDArray[np.int64]) -> scipy.sparse.csc_array:
+def cotangent_laplacian(V: Real, F: Indices) -> scipy.sparse.csc_array:
     """Return the positive semi-definite cotangent Laplacian (n, n) of Eq. (6); V (n, 2 or 3)."""
     return laplacian_of_weights(F, half_cotangents(V, F), len(V))
 
@@ -150,7 +142,7 @@ def delaunay_laplacian(mesh: TriangleMesh) -> tuple[scipy.sparse.csc_array, floa
             for k, e in enumerate(edges):
                 lengths[block, k] = np.sqrt(sum(x * x for x in e.T))
         small = mesh.n * SLOTS < 2**31
-        before: NDArray[np.int64] = mesh.F.astype(np.int32 if small else np.int64)
+        before: Indices = mesh.F.astype(np.int32 if small else np.int64)
         F, _, weights = intrinsic_delaunay(before, lengths, weights)
         changed = 0 if F is before else np.count_nonzero(before != F)
         return laplacian_of_weights(F, weights, mesh.n), changed / F.size

@@ -12,7 +12,6 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.beltrami import dilatations as dilatations_between
 from cembench.conformal.gauge import gauge_measure, moved_to_gauge
@@ -31,14 +30,14 @@ from cembench.conformal.texel_density import (
     texture_words,
     undersampled_share,
 )
-from cembench.core.arrays import Complex, Real
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.blocks import blocks, in_blocks
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Share of E_D by which rounding may make E_C negative.
-LEAST_ENERGY = 1e-9
+MIN_ENERGY = 1e-9
 #: Number of triangles that :class:`SampledAngleError` samples.
 SAMPLE = 4_000
 #: Allowed distance from the unit circle of a disk map's boundary, for a common gauge.
@@ -50,7 +49,7 @@ def dirichlet_energy(mesh: TriangleMesh, uv: Complex) -> float:
     return _energy_of_weights(half_cotangents(mesh.V, mesh.F), mesh.F, uv)
 
 
-def _energy_of_weights(weights: Real, F: NDArray[np.int64], uv: Complex) -> float:
+def _energy_of_weights(weights: Real, F: Indices, uv: Complex) -> float:
     """Return E_D for half the cotangents (m, 3) of the corners."""
     squared = np.empty((3, len(F)))
     for block in blocks(len(F)):
@@ -65,7 +64,7 @@ def image_area(mesh: TriangleMesh, uv: Complex) -> float:
     return sum(polygon_area(uv[loop]) for loop in mesh.loops)
 
 
-def corner_angles(points: Real | Complex, F: NDArray[np.int64]) -> Real:
+def corner_angles(points: Real | Complex, F: Indices) -> Real:
     """Return the angles of triangles in degrees.
 
     Parameters
@@ -97,7 +96,7 @@ def _coordinates(points: Real | Complex) -> Real:
     return np.asarray(points, np.float64)
 
 
-def _angles(V: Real, F: NDArray[np.int64]) -> Real:
+def _angles(V: Real, F: Indices) -> Real:
     return _in_degrees(*corner_products(V, F))
 
 
@@ -179,7 +178,7 @@ def boundary_circles(mesh: TriangleMesh, uv: Complex) -> tuple[BoundaryCircle, .
     return tuple(circle_of(loop, uv[loop]) for loop in [*loops[:1], *sorted(loops[1:], key=min)])
 
 
-def circle_of(loop: NDArray[np.int64], z: Complex) -> BoundaryCircle:
+def circle_of(loop: Indices, z: Complex) -> BoundaryCircle:
     """Return the circle fitted to the image z (k,) of a boundary loop (k,)."""
     centre, radius = fitted_circle(z)
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -525,7 +524,7 @@ def lost_in_rounding(metrics: Mapping[str, float]) -> list[Notice]:
         if not np.isfinite(value)
     ]
     energy, whole = metrics["conformal_energy"], metrics["dirichlet_energy"]
-    if energy < -LEAST_ENERGY * abs(whole):
+    if energy < -MIN_ENERGY * abs(whole):
         lost.append(f"conformal_energy is {energy:.3g}, which only rounding can make negative")
     return [Notice(NoticeKind.LOST_IN_ROUNDING, text) for text in lost]
 

@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import half_cotangents, laplacian_of_weights
-from cembench.core.arrays import Loop, Real
+from cembench.core.arrays import Indices, Loop, Real
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 #: Height of a fan's triangle, as a share of its base, below which it has no area.
@@ -23,7 +22,7 @@ SLIM = 1e-9
 _TERMS = 28
 
 
-def fan(loop: Loop, centre: int) -> NDArray[np.int64]:
+def fan(loop: Loop, centre: int) -> Indices:
     """Return the triangles (k, 3) that fill a hole from a centre, oriented like the surface.
 
     `loop` has the surface on its left, as in ``mesh.loops``.
@@ -69,8 +68,7 @@ def fan_patch(rim: Real) -> Real:
         weights = np.ones_like(weights)
     L = laplacian_of_weights(F, weights, k + 1).toarray()
     spokes = L[:k, k]
-    P: Real = L[:k, :k] - np.outer(spokes, spokes) / L[k, k]
-    return P
+    return L[:k, :k] - np.outer(spokes, spokes) / L[k, k]
 
 
 def disk_patch(angles: Real) -> Real:
@@ -88,8 +86,7 @@ def disk_patch(angles: Real) -> Real:
     slopes = arcs / np.outer(lengths, lengths)
     # u' is (u_next - u) / length on each arc: differences of rows and of columns.
     rows = np.roll(slopes, 1, axis=0) - slopes
-    P: Real = np.roll(rows, 1, axis=1) - rows
-    return P
+    return np.roll(rows, 1, axis=1) - rows
 
 
 def sum_of_cosines(x: Real) -> Real:
@@ -105,8 +102,7 @@ def sum_of_cosines(x: Real) -> Real:
     for term in _coefficients()[::-1]:
         rest = (rest + term) * squared
     log = np.log(np.where(x > 0, x, 1.0))
-    total: Real = squared * (log / 2 - 0.75 - rest)
-    return total
+    return squared * (log / 2 - 0.75 - rest)
 
 
 @cache
@@ -115,5 +111,4 @@ def _coefficients() -> Real:
     from scipy.special import bernoulli, factorial
 
     k = np.arange(1, _TERMS + 1)
-    numbers: Real = np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))
-    return numbers
+    return np.abs(bernoulli(2 * _TERMS)[2 * k]) / (2 * k * factorial(2 * k + 2))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.blocks import in_blocks
 
 #: The sign of an area computed in doubles is certain if it exceeds this share of its terms
@@ -17,7 +17,7 @@ UNDERFLOW = 1e-280
 #: Precision of an angle between neighbours on the unit circle, in radians.
 ANGLE_ROUNDING = 4 * float(np.finfo(float).eps)
 #: Most boundary crossings for which an overlap is computed; size of its buffers.
-MOST_CROSSINGS, AT_ONCE = 20_000, 2_000_000
+MAX_CROSSINGS, AT_ONCE = 20_000, 2_000_000
 
 
 def polygon_area(z: Complex) -> float:
@@ -26,22 +26,22 @@ def polygon_area(z: Complex) -> float:
     return 0.5 * float(np.imag(np.conj(w) * np.roll(w, -1)).sum())
 
 
-def signed_areas(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.float64]:
+def signed_areas(uv: Complex, F: Indices) -> Real:
     """Return the area of each triangle's image, shape (m,); positive if counter-clockwise."""
 
-    def of_triangles(F: NDArray[np.int64]) -> NDArray[np.float64]:
+    def of_triangles(F: Indices) -> Real:
         a, b, c = (uv.take(F[:, k]) for k in range(3))
         return 0.5 * np.imag(np.conj(b - a) * (c - a))
 
     return in_blocks(of_triangles, F)
 
 
-def folded_triangles(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int64]:
+def folded_triangles(uv: Complex, F: Indices) -> Indices:
     """Return the triangles whose image has no positive area, by its exact sign."""
     return np.flatnonzero(orientations(uv, F) <= 0)
 
 
-def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+def orientations(uv: Complex, F: Indices) -> NDArray[np.int8]:
     """Return the exact sign of each triangle's image area: 1, 0 or -1, shape (m,).
 
     Exact for the given doubles: if rounding could hide the sign, integer arithmetic decides. A
@@ -50,7 +50,7 @@ def orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
     return in_blocks(lambda some: _orientations(uv, some), F)
 
 
-def _orientations(uv: Complex, F: NDArray[np.int64]) -> NDArray[np.int8]:
+def _orientations(uv: Complex, F: Indices) -> NDArray[np.int8]:
     a, b, c = (uv.take(F[:, k]) for k in range(3))
     with np.errstate(over="ignore", invalid="ignore", under="ignore"):
         p, q = b - a, c - a
@@ -160,7 +160,7 @@ def overlap_share(curves: Sequence[Complex]) -> float:
     The curves are the closed polygons that bound the region, holes clockwise. Without folds, a
     point with winding number w is covered w times, of which w - 1 are too many. The share is the
     area of these over the area of all layers; infinite if the curves cross more than
-    :data:`MOST_CROSSINGS` times or enclose nothing.
+    :data:`MAX_CROSSINGS` times or enclose nothing.
 
     Examples
     --------
@@ -186,7 +186,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
     """Return the area of all layers that closed curves bound, and of the layers above the lowest.
 
     The curves are given by their sides, from `starts` to `ends` (b,), the region to their left.
-    Both are NaN if sides cross more than :data:`MOST_CROSSINGS` times.
+    Both are NaN if sides cross more than :data:`MAX_CROSSINGS` times.
     """
     import shapely
 
@@ -196,7 +196,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
         np.stack([starts.real, ends.real], axis=1), np.stack([starts.imag, ends.imag], axis=1)
     )
     meeting = shapely.STRtree(sides).query(sides, predicate="intersects").shape[1]
-    if (meeting - 3 * len(sides)) / 2 > MOST_CROSSINGS:  # each side meets itself and its neighbours
+    if (meeting - 3 * len(sides)) / 2 > MAX_CROSSINGS:  # each side meets itself and its neighbours
         return float("nan"), float("nan")
     faces = shapely.get_parts(shapely.polygonize([shapely.unary_union(sides)]))
     inside = shapely.point_on_surface(faces)
@@ -206,7 +206,7 @@ def layered_areas(starts: Complex, ends: Complex) -> tuple[float, float]:
     return covered, float((np.maximum(layers - 1, 0) * areas).sum())
 
 
-def windings(points: Complex, starts: Complex, ends: Complex) -> NDArray[np.int64]:
+def windings(points: Complex, starts: Complex, ends: Complex) -> Indices:
     """Return the winding numbers of closed curves around points (k,).
 
     The curves are given by their sides, from `starts` to `ends` (b,); no point lies on a side.

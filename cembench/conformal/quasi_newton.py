@@ -13,9 +13,9 @@ from cembench.core.clock import phase
 from cembench.core.errors import AlgorithmFailed
 
 #: With more steps than this the boundary's dense triangle would have been cheaper.
-MOST_STEPS = 8
+MAX_STEPS = 8
 #: A step must lower the energy by this share of what was predicted.
-LEAST_AGREEMENT = 0.25
+MIN_AGREEMENT = 0.25
 
 
 def quasi_newton_minimum(
@@ -24,7 +24,7 @@ def quasi_newton_minimum(
     """Minimise the conformal energy from `here` on, in its gauge.
 
     Ends when E_C can decrease by at most the share `tolerance`. Returns None if a step lowers E_C
-    by much less than predicted, if an arc would have to be held, or if :data:`MOST_STEPS` steps do
+    by much less than predicted, if an arc would have to be held, or if :data:`MAX_STEPS` steps do
     not suffice; :func:`minimise` is for these boundaries.
     """
     energies, pairs = [here.energy], list[tuple[Real, Real]]()
@@ -41,14 +41,14 @@ def quasi_newton_minimum(
             reason = "iterations"
         elif not predicted >= ROUNDING * len(here.weights):
             reason = "rounding"
-        elif len(energies) > MOST_STEPS:
+        elif len(energies) > MAX_STEPS:
             return None
         else:
             try:
                 there = here.at(in_gauge(here.moved(step), here.weights))
             except AlgorithmFailed:
                 return None
-            if not here.energy - there.energy > LEAST_AGREEMENT * predicted:
+            if not here.energy - there.energy > MIN_AGREEMENT * predicted:
                 return None
             pairs.append((step, there.gradient - here.gradient))
             if not float(step @ pairs[-1][1]) > 0:  # no minimum in sight

@@ -8,15 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 
 
-def balanced_planar_map(
-    L: scipy.sparse.csc_array, V: NDArray[np.float64], F: NDArray[np.int64]
-) -> Complex:
+def balanced_planar_map(L: scipy.sparse.csc_array, V: Real, F: Indices) -> Complex:
     """Return the planar map (n,) from which a spherical map starts.
 
     L, V and F are those of a closed surface. One pole lies in its most regular triangle, and both
@@ -26,16 +23,14 @@ def balanced_planar_map(
     return balanced(harmonic_around_triangle(L, V, F[outer]), F, outer)
 
 
-def most_regular_triangle(V: NDArray[np.float64], F: NDArray[np.int64]) -> int:
+def most_regular_triangle(V: Real, F: Indices) -> int:
     """Return the triangle whose sides are closest to equal; the first one in a tie."""
     sides = np.linalg.norm(V[F] - V[np.roll(F, 1, axis=1)], axis=2)
     share = sides / sides.sum(axis=1, keepdims=True)
     return int(np.argmin(np.abs(share - 1 / 3).sum(axis=1)))
 
 
-def harmonic_around_triangle(
-    L: scipy.sparse.csc_array, V: NDArray[np.float64], triangle: NDArray[np.int64]
-) -> Complex:
+def harmonic_around_triangle(L: scipy.sparse.csc_array, V: Real, triangle: Indices) -> Complex:
     """Return the planar map (n,) that is harmonic for L and keeps the shape of one triangle (3,).
 
     The triangle is counter-clockwise with its first side on [0, 1]; all others lie inside it,
@@ -49,7 +44,7 @@ def harmonic_around_triangle(
     return z - z.mean()
 
 
-def balanced(z: Complex, F: NDArray[np.int64], outer: int) -> Complex:
+def balanced(z: Complex, F: Indices, outer: int) -> Complex:
     """Scale a planar map so that both poles of the sphere look alike.
 
     The mean side of the triangle `outer` then equals that of the innermost other triangle seen from

@@ -10,14 +10,13 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Real
 
 Pole = Literal["north", "south"]
 
 
-def to_plane(S: NDArray[np.float64], pole: Pole = "north") -> Complex:
+def to_plane(S: Real, pole: Pole = "north") -> Complex:
     """Project points S (n, 3) of the sphere from a pole; (n,), infinite at the pole."""
     distance = 1 - S[:, 2] if pole == "north" else 1 + S[:, 2]
     z = np.full(len(S), complex(np.inf))
@@ -25,7 +24,7 @@ def to_plane(S: NDArray[np.float64], pole: Pole = "north") -> Complex:
     return z
 
 
-def to_sphere(z: Complex, pole: Pole = "north") -> NDArray[np.float64]:
+def to_sphere(z: Complex, pole: Pole = "north") -> Real:
     """Return the points (n, 3) of the sphere that project to z (n,); infinity gives the pole."""
     modulus = np.abs(z)
     far = modulus > 1

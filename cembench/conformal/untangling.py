@@ -21,7 +21,7 @@ import scipy
 from numpy.typing import NDArray
 
 from cembench.conformal.laplacian import corner_products
-from cembench.core.arrays import Complex, Indices, Real
+from cembench.core.arrays import Complex, Indices, Mask, Real, numbered
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -45,7 +45,7 @@ REGULAR = 1e-10
 def untangled(
     mesh: TriangleMesh,
     z: Complex,
-    free: NDArray[np.bool_],
+    free: Mask,
     graph: scipy.sparse.csr_array,
     steps: int = STEPS,
     first: float = FIRST,
@@ -102,7 +102,7 @@ class _Patches:
     """
 
     def __init__(
-        self, mesh: TriangleMesh, z: Complex, free: NDArray[np.bool_], graph: scipy.sparse.csr_array
+        self, mesh: TriangleMesh, z: Complex, free: Mask, graph: scipy.sparse.csr_array
     ) -> None:
         self.vertices = np.flatnonzero(free)
         among = graph[self.vertices][:, self.vertices]
@@ -113,8 +113,7 @@ class _Patches:
         self.of_all = patch[mesh.F].max(axis=1)
         T = mesh.F[self.of_all >= 0]
         self._of = self.of_all[self.of_all >= 0]
-        place = np.full(mesh.n, -1)
-        place[self.vertices] = np.arange(len(self.vertices))
+        place = numbered(mesh.n, self.vertices)
         self._corners = place[T]
         self._held = z[T]
         to_z, to_zbar, area = _derivatives(mesh.V, T)

@@ -62,7 +62,7 @@ def file_name(name: str, longest: int = LONGEST) -> str:
 
 
 #: Maximum number of known names that a message lists.
-MOST_NAMED = 60
+MAX_NAMED = 60
 
 
 def unknown(kind: str, name: str, known: Iterable[str]) -> str:
@@ -72,8 +72,8 @@ def unknown(kind: str, name: str, known: Iterable[str]) -> str:
     "unknown metric 'image_aera'. Did you mean image_area? Known: dirichlet_energy, image_area."
     """
     known = sorted(known)
-    names = ", ".join(known[:MOST_NAMED]) or "none"
-    names += f" and {len(known) - MOST_NAMED} more" if len(known) > MOST_NAMED else ""
+    names = ", ".join(known[:MAX_NAMED]) or "none"
+    names += f" and {len(known) - MAX_NAMED} more" if len(known) > MAX_NAMED else ""
     near = did_you_mean(name, known)
     return f"unknown {kind} {name!r}{f'.{near} Known' if near else '; known'}: {names}."
 

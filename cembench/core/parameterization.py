@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
+from cembench.core.arrays import Complex
 
 
 @dataclass(frozen=True)
@@ -41,7 +40,7 @@ class Parameterization:
 
     """
 
-    uv: NDArray[np.complex128]
+    uv: Complex
     iterations: int = 0
     energy_history: tuple[float, ...] = ()
     extras: dict[str, Any] = field(default_factory=dict)
@@ -67,7 +66,7 @@ class Atlas:
 
     """
 
-    corners: NDArray[np.complex128]
+    corners: Complex
     extras: dict[str, Any] = field(default_factory=dict)
 
 
@@ -101,7 +100,7 @@ class MapStep:
 
     sweep: int
     boundary: int
-    before: NDArray[np.complex128] | None
-    uv: NDArray[np.complex128]
+    before: Complex | None
+    uv: Complex
     energies: tuple[float, ...]
-    result: NDArray[np.complex128] | None = None
+    result: Complex | None = None

@@ -10,6 +10,7 @@ from cvxopt import cholmod, matrix, spmatrix
 from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.core.arrays import Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.factor_part import FactorPart, FactorTree
@@ -26,7 +27,7 @@ _ALL, _FORWARD, _BACKWARD, _PERMUTE, _PERMUTE_BACK = 0, 4, 5, 7, 8
 FEW = 0.1
 #: From a lower triangle to the order of its rows, by the postorder of the elimination tree:
 #: otherwise columns of one supernode would not be neighbours.
-Order = Callable[[spmatrix], NDArray[np.int64]]
+Order = Callable[[spmatrix], Indices]
 
 
 class CholmodFactor:
@@ -44,7 +45,7 @@ class CholmodFactor:
             self._lower, self._below = _lower_triangle(A)
             permutation = _order(self._lower, leading, order)
             self._permutation = as_permutation(permutation)
-            self.order: NDArray[np.int64] | None = permutation
+            self.order: Indices | None = permutation
         self._analyse()
         self._factor()
 
@@ -53,11 +54,11 @@ class CholmodFactor:
             set_options(postorder=self._leading is None)
             self._symbolic = cholmod.symbolic(self._lower, self._permutation)
             vars(self).pop("_tree", None)
-            self._near: tuple[NDArray[np.int64], FactorPart | None] | None = None
+            self._near: tuple[Indices, FactorPart | None] | None = None
             count_analysis()
 
     def _factor(self) -> None:
-        self._trailing: NDArray[np.float64] | None = None
+        self._trailing: Real | None = None
         with phase("factorisation"):
             set_options(postorder=self._leading is None)
             try:
@@ -78,13 +79,13 @@ class CholmodFactor:
             self._analyse()
         self._factor()
 
-    def solve(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve(self, B: Real) -> Real:
         """Return X with A X = B for real columns B (n, k)."""
         x = matrix(np.asfortranarray(B))
         cholmod.solve(self._symbolic, x, sys=_ALL)
         return np.array(x)
 
-    def part(self, rows: NDArray[np.int64]) -> FactorPart | None:
+    def part(self, rows: Indices) -> FactorPart | None:
         """Return what substitutions between these rows pass; None if inaccessible."""
         return None if self._tree is None else FactorPart(self._tree, rows)
 
@@ -92,7 +93,7 @@ class CholmodFactor:
     def _tree(self) -> FactorTree | None:
         return FactorTree.of(self._symbolic, self._lower.size[0])
 
-    def solve_leading(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve_leading(self, B: Real) -> Real:
         """Return X with A_ii X = B for the leading block, from the one factor; B (leading, k)."""
         assert self._leading is not None
         padded = np.zeros((self._lower.size[0], B.shape[1]), order="F")
@@ -105,24 +106,24 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
         return np.array(x)[: self._leading]
 
-    def schur_factor(self) -> NDArray[np.float64] | None:
+    def schur_factor(self) -> Real | None:
         """Return the trailing block of the factor, after the leading one; None if inaccessible."""
         assert self._leading is not None
         if self._trailing is None:
             self._trailing = trailing_block(self._symbolic, self._lower.size[0], self._leading)
         return self._trailing
 
-    def solve_trailing(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def solve_trailing(self, B: Real) -> Real | None:
         """x_t of A x = B for B (n, k): L y = B ends in y_t with C^T x_t = y_t."""
         C = self.schur_factor()
         return None if C is None else triangle_solved(C, self._forward_end(B), transposed=True)
 
-    def condensed(self, B: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    def condensed(self, B: Real) -> Real | None:
         """Return B_t - A_tl A_ll^-1 B_l for B (n, k): C y_t, where L y = B ends in y_t."""
         C = self.schur_factor()
         return None if C is None else triangle_times(C, self._forward_end(B))
 
-    def _forward_end(self, B: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _forward_end(self, B: Real) -> Real:
         """y_t of L y = B; of the leading rows only those of few entries and their ancestors."""
         assert self._leading is not None
         rows = np.flatnonzero(B[: self._leading].any(axis=1))
@@ -136,15 +137,13 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_FORWARD)
         return np.array(x)[self._leading :]
 
-    def _with_trailing(self, rows: NDArray[np.int64]) -> FactorPart | None:
+    def _with_trailing(self, rows: Indices) -> FactorPart | None:
         """Return the part between rows of the leading block and all behind it."""
         assert self._leading is not None
         trailing = np.arange(self._leading, self._lower.size[0])
         return self.part(np.concatenate([rows, trailing]))
 
-    def extended(
-        self, B: NDArray[np.float64], rows: NDArray[np.int64] | None = None
-    ) -> NDArray[np.float64] | None:
+    def extended(self, B: Real, rows: Indices | None = None) -> Real | None:
         """Return -A_ll^-1 A_lt B for B (n - leading, k): the solution of L^T x = (0, C^T B).
 
         All leading rows of it, or some.
@@ -166,7 +165,7 @@ class CholmodFactor:
         cholmod.solve(self._symbolic, x, sys=_PERMUTE_BACK)
         return np.array(x)[slice(self._leading) if rows is None else rows]
 
-    def _kept_part(self, rows: NDArray[np.int64]) -> FactorPart | None:
+    def _kept_part(self, rows: Indices) -> FactorPart | None:
         """Return the part from some rows on, made once for the same array."""
         if self._near is None or self._near[0] is not rows:
             self._near = rows, self._with_trailing(rows)
@@ -190,7 +189,7 @@ def _in_order(A: sparse.csc_array) -> sparse.csc_array:
     return A if A.has_sorted_indices else A.sorted_indices()
 
 
-def _order(lower: spmatrix, leading: int | None, order: Order) -> NDArray[np.int64]:
+def _order(lower: spmatrix, leading: int | None, order: Order) -> Indices:
     """Return the order of all rows, or that of the leading block with the others after it."""
     if leading is None:
         return order(lower)

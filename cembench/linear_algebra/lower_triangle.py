@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
+
+from cembench.core.arrays import Indices
 
 
-def permuted_lower(A: scipy.sparse.csr_array, order: NDArray[np.int64]) -> scipy.sparse.csc_array:
+def permuted_lower(A: scipy.sparse.csr_array, order: Indices) -> scipy.sparse.csc_array:
     """Return the lower triangle of ``A[order][:, order]``, in one pass over A.
 
     Parameters

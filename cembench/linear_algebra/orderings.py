@@ -12,9 +12,9 @@ from functools import cache
 
 import numpy as np
 from cvxopt import amd, cholmod, matrix, spmatrix
-from numpy.typing import NDArray
 from scipy import sparse
 
+from cembench.core.arrays import Indices, Real
 from cembench.linear_algebra.supernodes import order_of
 
 #: Binary digits of a coordinate; the three together fit a double's 53.
@@ -36,12 +36,12 @@ def set_options(*, postorder: bool) -> None:
     cholmod.options["postorder"] = postorder
 
 
-def minimum_degree(lower: spmatrix) -> NDArray[np.int64]:
+def minimum_degree(lower: spmatrix) -> Indices:
     """Return the AMD ordering (n,) of the matrix with this lower triangle; it is a postorder."""
     return np.array(amd.order(lower)).ravel()
 
 
-def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
+def nested_dissection(lower: spmatrix) -> Indices:
     """Return the METIS ordering (n,) of the matrix with this lower triangle, postordered."""
     import pymetis  # an extra
 
@@ -60,7 +60,7 @@ def nested_dissection(lower: spmatrix) -> NDArray[np.int64]:
     return _postordered(lower, order)
 
 
-def dissection_by_position(lower: spmatrix, points: NDArray[np.float64]) -> NDArray[np.int64]:
+def dissection_by_position(lower: spmatrix, points: Real) -> Indices:
     """Return a nested dissection (n,) of a matrix whose rows lie at points (n, 3) of a surface.
 
     Boxes are halved at their middles, x, y and z in turn. What of a box's lower half has a
@@ -79,7 +79,7 @@ def dissection_by_position(lower: spmatrix, points: NDArray[np.float64]) -> NDAr
     return np.argsort(ends << 6 | level, kind="stable")
 
 
-def _interleaved(points: NDArray[np.float64]) -> NDArray[np.int64]:
+def _interleaved(points: Real) -> Indices:
     """Return the position (n,) of points (n, 3) on a curve through boxes in boxes (Morton's)."""
     places = points - points.min(axis=0)
     places /= places.max() or 1.0
@@ -88,7 +88,7 @@ def _interleaved(points: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 @cache
-def _spread_digits() -> NDArray[np.int64]:
+def _spread_digits() -> Indices:
     """Return each number of so many binary digits with these three places apart."""
     numbers = np.arange(2**DIGITS)
     spread = np.zeros_like(numbers)
@@ -97,13 +97,13 @@ def _spread_digits() -> NDArray[np.int64]:
     return spread
 
 
-def _postordered(lower: spmatrix, order: NDArray[np.int64]) -> NDArray[np.int64]:
+def _postordered(lower: spmatrix, order: Indices) -> Indices:
     """Return the equivalent order by the postorder of the elimination tree."""
     set_options(postorder=True)
     postorder = order_of(cholmod.symbolic(lower, as_permutation(order)), len(order))
     return order if postorder is None else np.asarray(postorder, dtype=np.int64)
 
 
-def as_permutation(order: NDArray[np.int64]) -> matrix:
+def as_permutation(order: Indices) -> matrix:
     """Return an ordering as cvxopt's functions take it."""
     return matrix(order, (len(order), 1), "i")

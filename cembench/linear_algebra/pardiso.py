@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 import numpy as np
 import pypardiso
-from numpy.typing import NDArray
 from pypardiso.pardiso_wrapper import PyPardisoError
 from scipy import sparse
 
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.work import count_analysis, count_factorisation
@@ -19,9 +19,7 @@ from cembench.linear_algebra.work import count_analysis, count_factorisation
 _SPD = 2
 
 
-def pardiso_solver(
-    A: sparse.csc_array,
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def pardiso_solver(A: sparse.csc_array) -> Callable[[Real], Real]:
     """Factor A and return a function that solves A X = B for real columns B (n, k).
 
     Raises
@@ -45,7 +43,7 @@ def pardiso_solver(
         count_analysis()
         count_factorisation(A.shape[0], lambda: 0)
 
-    def solve(B: NDArray[np.float64]) -> NDArray[np.float64]:
+    def solve(B: Real) -> Real:
         return np.asarray(solver.solve(upper, np.asfortranarray(B)))
 
     weakref.finalize(solve, solver.free_memory, everything=True)

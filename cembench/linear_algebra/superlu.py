@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from cembench.core.arrays import Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.work import count_analysis, count_factorisation
 
 
-def superlu_solver(
-    A: sparse.csc_array,
-) -> Callable[[NDArray[np.float64]], NDArray[np.float64]]:
+def superlu_solver(A: sparse.csc_array) -> Callable[[Real], Real]:
     """Factor A and return a function that solves A X = B for real columns B (n, k).
 
     Raises

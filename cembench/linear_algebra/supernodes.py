@@ -13,6 +13,8 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
+
 _NUMBERS_BEFORE = ("n", "minor")
 _POINTERS = ("Perm", "ColCount", "IPerm")
 _SIMPLICIAL = ("nzmax", "p", "i", "x", "z", "nz", "next", "prev")
@@ -37,15 +39,15 @@ class Supernodes(NamedTuple):
     """A supernodal factor's arrays, without copies. A supernode is a run of columns alike below."""
 
     #: First column of each supernode, and the number of columns.
-    first: NDArray[np.int64]
+    first: Indices
     #: Where the rows of each supernode begin, and the rows; the first are those of its columns.
-    row_at: NDArray[np.int64]
-    rows: NDArray[np.int64]
+    row_at: Indices
+    rows: Indices
     #: Where the entries of each supernode begin, by columns, and the entries.
-    value_at: NDArray[np.int64]
-    values: NDArray[np.float64]
+    value_at: Indices
+    values: Real
     #: The row of the matrix at each row of the factor.
-    order: NDArray[np.int64]
+    order: Indices
 
     @classmethod
     def of(cls, held: FactorStructure) -> Self:
@@ -60,20 +62,20 @@ class Supernodes(NamedTuple):
         )
 
     @property
-    def widths(self) -> NDArray[np.int64]:
+    def widths(self) -> Indices:
         """Number of columns of each supernode."""
         return np.diff(self.first)
 
     @property
-    def heights(self) -> NDArray[np.int64]:
+    def heights(self) -> Indices:
         """Number of rows of each supernode, those of its columns included."""
         return np.diff(self.row_at)
 
-    def of_columns(self, columns: NDArray[np.int64]) -> NDArray[np.int64]:
+    def of_columns(self, columns: Indices) -> Indices:
         """Return the supernode of each column."""
         return np.searchsorted(self.first, columns, side="right") - 1
 
-    def parents(self) -> NDArray[np.int64]:
+    def parents(self) -> Indices:
         """Return each supernode's parent in the elimination tree; -1 for a root."""
         parents = np.full(len(self.widths), -1)
         inner = np.flatnonzero(self.heights > self.widths)
@@ -81,7 +83,7 @@ class Supernodes(NamedTuple):
         return parents
 
 
-def trailing_block(factor: Any, n: int, leading: int) -> NDArray[np.float64] | None:
+def trailing_block(factor: Any, n: int, leading: int) -> Real | None:
     """Return the last rows and columns of a factor, from `leading` on.
 
     Parameters
@@ -128,7 +130,7 @@ def factor_entries(factor: Any) -> int:
     return 0 if held is None else int(held.xsize)
 
 
-def order_of(factor: Any, n: int) -> NDArray[np.int64] | None:
+def order_of(factor: Any, n: int) -> Indices | None:
     """Return the order of rows (n,) of a symbolic supernodal factor; None if it is unexpected."""
     held = held_factor(factor, n, numeric=False)
     if held is None:

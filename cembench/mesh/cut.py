@@ -26,9 +26,8 @@ from pathlib import Path
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Complex, Indices, Mask, Points, marked
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
@@ -221,15 +220,14 @@ def read_seams(path: Path) -> list[list[int]]:
         ) from None
 
 
-def edges_of_uv_seams(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> Indices:
+def edges_of_uv_seams(mesh: TriangleMesh, uv: Complex) -> Indices:
     """Return the edges (k, 2) at which texture coordinates of the corners (m, 3) differ."""
     net = _Net.of(mesh)
     (s, c), (t, d) = (np.divmod(half_edges, 3) for half_edges in net.pairs.T)
     ends = uv[s, c] - uv[t, (d + 1) % 3], uv[s, (c + 1) % 3] - uv[t, d]
     slack = 1e-6 * float(np.abs(uv - uv.mean()).max())
     apart = np.maximum(*map(np.abs, ends)) > slack
-    edges: Indices = net.edges[net.edge[net.pairs[apart, 0]]]
-    return edges
+    return net.edges[net.edge[net.pairs[apart, 0]]]
 
 
 def write_numbers(path: Path, what: str, original: Indices) -> None:
@@ -249,7 +247,7 @@ class _Net:
     edge: Indices  #: (3m,), the edge of each half-edge
     pairs: Indices  #: (interior edges, 2), their half-edges
     lengths: Points  #: (e,)
-    rim: NDArray[np.bool_]  #: (e,), whether an edge is on the boundary
+    rim: Mask  #: (e,), whether an edge is on the boundary
     loops: tuple[Indices, ...]
 
     @classmethod
@@ -272,8 +270,7 @@ class _Net:
 
     def numbers(self, path: Indices) -> list[int]:
         """Return the edges between successive vertices of a path."""
-        edges: list[int] = self._between(path[:-1], path[1:]).tolist()
-        return edges
+        return self._between(path[:-1], path[1:]).tolist()
 
     def roots(self, points: list[int]) -> list[int]:
         """Return the vertices at which trees of shortest paths may start."""
@@ -299,8 +296,7 @@ class _Net:
             self._distances(), indices=root, return_predecessors=True
         )
         child = np.flatnonzero(before >= 0)
-        in_tree = np.zeros(len(self.edges), dtype=bool)
-        in_tree[self._between(child, before[child])] = True
+        in_tree = marked(len(self.edges), self._between(child, before[child]))
         crossed = self._cotree(away, in_tree)
         loose = np.flatnonzero(~(in_tree | crossed | self.rim))
         ends = [int(loop[np.argmin(away[loop])]) for loop in self.loops]
@@ -318,8 +314,7 @@ class _Net:
 
     def cut(self, graph: Iterable[int]) -> tuple[Indices, Indices]:
         """Return the triangles cut along these edges, and the original of each vertex."""
-        open_ = np.zeros(len(self.edges), dtype=bool)
-        open_[list(graph)] = True
+        open_ = marked(len(self.edges), list(graph))
         return glue(self.F, self.pairs[~open_[self.edge[self.pairs[:, 0]]]], self.n)
 
     def _between(self, i: Indices, j: Indices) -> Indices:
@@ -331,7 +326,7 @@ class _Net:
         weights = np.where(self.rim, 1e-9 * self.lengths.mean(), self.lengths)
         return _graph(self.edges, weights, self.n)
 
-    def _cotree(self, away: Points, in_tree: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    def _cotree(self, away: Points, in_tree: Mask) -> Mask:
         """Return the edges that a spanning tree of the triangles crosses, farthest first."""
         number = self.edge[self.pairs[:, 0]]
         loop_length = away[self.edges[number]].sum(axis=1) + self.lengths[number]
@@ -346,9 +341,7 @@ class _Net:
         keys = i * m + j
         order = np.argsort(keys)
         at = np.searchsorted(keys[order], chosen.row.astype(np.int64) * m + chosen.col)
-        crossed = np.zeros(len(self.edges), dtype=bool)
-        crossed[number[order[at]]] = True
-        return crossed
+        return marked(len(self.edges), number[order[at]])
 
 
 def _graph(edges: Indices, weights: Points, n: int) -> scipy.sparse.csr_array:

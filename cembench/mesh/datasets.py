@@ -16,6 +16,7 @@ import tempfile
 from collections.abc import Callable, Generator, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from math import inf
 from pathlib import Path, PurePosixPath
 from threading import Event
@@ -173,6 +174,7 @@ def fetch(
     seconds: float = inf,
     progress: Progress | None = None,
     have: Sequence[Path] = (),
+    stop: Event | None = None,
 ) -> Path:
     """Return the path of a dataset's file; it is fetched unless the cache has it complete.
 
@@ -190,6 +192,8 @@ def fetch(
         Receives the progress.
     have : sequence of Path
         Folders with files that were downloaded before.
+    stop : Event, optional
+        Ends the download once it is set.
 
     Returns
     -------
@@ -207,18 +211,9 @@ def fetch(
         The cache cannot be written to, or its disk is full.
 
     """
-    return _fetch(dataset, _bounds(dataset, timeout, seconds), progress, have)
-
-
-def _bounds(dataset: Dataset, timeout: float, seconds: float, stop: Event | None = None) -> Bounds:
-    return Bounds(dataset.size or LARGEST, timeout, monotonic() + seconds, stop or Event())
-
-
-def _fetch(
-    dataset: Dataset, bounds: Bounds, progress: Progress | None, have: Sequence[Path]
-) -> Path:
     if is_fetched(dataset):
         return dataset.path
+    bounds = Bounds(dataset.size or LARGEST, timeout, monotonic() + seconds, stop or Event())
     try:
         if same := _file_with_content(dataset, have):
             _keep(dataset, lambda file: _copied(same, file))
@@ -313,11 +308,12 @@ def fetch_all(
         by_source.setdefault(dataset.source_url, []).append(dataset)
 
     stop = Event()
+    fetched = partial(fetch, timeout=timeout, seconds=seconds, stop=stop)
 
     def one(first: Dataset, *same: Dataset) -> None:
-        _fetch(first, _bounds(first, timeout, seconds, stop), progress(first), have)
+        fetched(first, progress=progress(first), have=have)
         for dataset in same:  # copies the file of the first
-            _fetch(dataset, _bounds(dataset, timeout, seconds, stop), None, ())
+            fetched(dataset)
 
     with ThreadPoolExecutor(max_workers=jobs) as pool:
         waiting = {pool.submit(one, *same): same for same in by_source.values()}

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from cembench.core.arrays import Indices, Mask, Points
+from cembench.core.arrays import Indices, Mask, Points, marked
 from cembench.core.blocks import blocks
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
@@ -199,14 +200,16 @@ class RepairLossError(MeshError):
         return f"{where}a repair would keep only {self.kept}. {way}{drop} allows the loss."
 
 
-def located(error: MeshError, path: Path | None) -> MeshError:
-    """Return the error with the path of its file, if there is one."""
-    if path is None:
-        return error
-    if isinstance(error, UnusableMeshError | RepairLossError):
-        error.path = path
-        return error
-    return MeshError(f"{path}: {error}")
+@contextmanager
+def located(path: Path | None) -> Iterator[None]:
+    """Name a surface's file, if there is one, in errors that are raised in this block."""
+    try:
+        yield
+    except (UnusableMeshError, RepairLossError) as error:
+        error.path = path or error.path
+        raise
+    except MeshError as error:
+        raise (error if path is None else MeshError(f"{path}: {error}")) from None
 
 
 def array_of(what: str, rows: ArrayLike, columns: int) -> NDArray[Any]:
@@ -307,7 +310,7 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
         _problem(Defect.not_finite, np.flatnonzero(~finite)),
         _problem(Defect.out_of_range, np.flatnonzero(~inside), F, last=len(V) - 1),
         scale,
-        _problem(Defect.isolated, np.flatnonzero(finite & ~_used(F[inside], len(V)))),
+        _problem(Defect.isolated, np.flatnonzero(finite & ~marked(len(V), F[inside]))),
     ]
     turned = np.zeros(0, dtype=bool)
     if len(valid):
@@ -322,7 +325,7 @@ def examine(V: Points, F: Indices, *, connected: bool) -> Examination:
     problems = [p for p in findings if p is not None]
     if not problems:
         slivers = np.flatnonzero(areas <= SLIVER_AREA)
-        return Examination(facing, (*_slivers(slivers), *_turned(turned)), ())
+        return Examination(facing, _remarks(slivers, turned), ())
     if len(valid):
         one_sided = any(p.defect is Defect.one_sided for p in problems)
         more = [
@@ -355,14 +358,6 @@ def relative_areas(V: Points, F: Indices) -> Points:
     return shares
 
 
-def _extents(V: Points, F: Indices) -> Points:
-    """Return the largest side of each triangle's bounding box."""
-    extents = np.empty(len(F))
-    for block, corners in _corners(V, F):
-        extents[block] = np.ptp(corners, axis=1).max(axis=0)
-    return extents
-
-
 def _corners(V: Points, F: Indices) -> Iterator[tuple[slice, Points]]:
     """Yield blocks of triangles (k), and their corners (3, 3, k): x, y, z of the three of each.
 
@@ -378,30 +373,26 @@ def out_of_scale(V: Points, F: Indices) -> Problem | None:
     finite = np.abs(V[np.isfinite(V).all(axis=1)])
     largest = finite.max(initial=0)
     if largest > LARGEST_LENGTH:
-        return Problem(
-            Defect.scale,
-            int((finite > LARGEST_LENGTH).any(axis=1).sum()),
-            f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}",
-        )
-    spans = _extents(V, F)
+        text = f"a coordinate is {largest:.3g} in size; allowed is up to {LARGEST_LENGTH:g}"
+        return Problem(Defect.scale, int((finite > LARGEST_LENGTH).any(axis=1).sum()), text)
+    spans = np.empty(len(F))  # the largest side of each triangle's bounding box
+    for block, corners in _corners(V, F):
+        spans[block] = np.ptp(corners, axis=1).max(axis=0)
     tiny = np.flatnonzero((spans > 0) & (spans < SMALLEST_LENGTH))
     if not len(tiny):
         return None
-    return Problem(
-        Defect.scale,
-        len(tiny),
+    text = (
         f"triangle {some(tiny)} (counted from 0) spans less than {SMALLEST_LENGTH:g}, the first "
-        f"{spans[tiny[0]]:.3g}",
+        f"{spans[tiny[0]]:.3g}"
     )
+    return Problem(Defect.scale, len(tiny), text)
 
 
 def duplicates(F: Indices) -> Mask:
     """Whether each triangle has the same three vertices as an earlier one."""
     alike = np.sort(F, axis=1)
     order = np.lexsort(alike.T)  # stable: the first of equal ones stays first
-    extra = np.zeros(len(F), dtype=bool)
-    extra[order[1:][(alike[order[1:]] == alike[order[:-1]]).all(axis=1)]] = True
-    return extra
+    return marked(len(F), order[1:][(alike[order[1:]] == alike[order[:-1]]).all(axis=1)])
 
 
 def representatives(V: Points, tolerance: float = 0.0) -> Indices:
@@ -412,14 +403,10 @@ def representatives(V: Points, tolerance: float = 0.0) -> Indices:
     if tolerance == 0:
         _, first, place = np.unique(V + 0.0, axis=0, return_index=True, return_inverse=True)
         return first[place.reshape(-1)]
-    from scipy import sparse
-    from scipy.sparse import csgraph
     from scipy.spatial import cKDTree
 
     i, j = cKDTree(V).query_pairs(tolerance, output_type="ndarray").T
-    graph = sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(len(V), len(V)))
-    _, place = csgraph.connected_components(graph, directed=False)
-    return np.unique(place, return_index=True)[1][place]
+    return topology.first_of_linked(i, j, len(V))
 
 
 def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
@@ -457,63 +444,49 @@ def coincident(V: Points) -> Problem | None:
     if not len(extra):
         return None
     i, j = finite[same[extra[0]]], finite[extra[0]]
-    return Problem(
-        Defect.coincident,
-        len(extra),
-        f"coincident vertices: {len(extra)} vertices have exactly the position of another "
-        f"vertex, the first pair being {i} and {j} (counted from 0); there may be open seams "
-        "that should be closed",
+    text = (
+        f"coincident vertices: {len(extra)} vertices have exactly the position of another vertex, "
+        f"the first pair being {i} and {j} (counted from 0); there may be open seams that should "
+        "be closed"
     )
+    return Problem(Defect.coincident, len(extra), text)
 
 
 def components(F: Indices, n: int) -> Problem | None:
     """Return the problem that triangles form several connected pieces, or None."""
     _, label = topology.components(F, n)
-    vertices = np.bincount(label, weights=_used(F, n)).astype(int)
+    vertices = np.bincount(label, weights=marked(n, F)).astype(int)
     pieces = np.flatnonzero(vertices)
     if len(pieces) == 1:
         return None
     ends = (vertices.argmax(), pieces[::-1][vertices[pieces[::-1]].argmin()])  # of equal ones, too
-    large, small = (np.flatnonzero((label == end) & _used(F, n))[0] for end in ends)
-    return Problem(
-        Defect.components,
-        len(pieces),
+    large, small = (np.flatnonzero((label == end) & marked(n, F))[0] for end in ends)
+    text = (
         f"the mesh has {len(pieces)} connected components (vertex {large} lies in the largest, "
         f"with {vertices.max()} of {vertices.sum()} vertices, vertex {small} in the smallest); "
-        "this needs exactly one",
+        "this needs exactly one"
     )
+    return Problem(Defect.components, len(pieces), text)
 
 
-def some(indices: NDArray[np.int64], most: int = 5) -> str:
+def some(indices: Indices, most: int = 5) -> str:
     """Format the first few of many indices for a message."""
     shown = ", ".join(str(k) for k in indices[:most].tolist())
     return shown + (f", ... ({len(indices)} in all)" if len(indices) > most else "")
 
 
-def _slivers(thin: Indices) -> tuple[Notice, ...]:
-    """Return a notice if some triangles are slivers."""
-    if not len(thin):
-        return ()
-    message = (
-        f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
-        f"{some(thin)}; energies and dilatations lose digits in rounding there"
-    )
-    return (Notice(NoticeKind.SLIVERS, message),)
-
-
-def _turned(turned: Mask) -> tuple[Notice, ...]:
-    """Return a notice if some triangles were reversed."""
-    if not turned.any():
-        return ()
-    message = f"orientation repaired: {turned.sum()} of {len(turned)} triangles were turned over"
-    return (Notice(NoticeKind.ORIENTATION_REPAIRED, message),)
-
-
-def _used(F: Indices, n: int) -> Mask:
-    """Whether each of n vertices belongs to a triangle."""
-    used = np.zeros(n, dtype=bool)
-    used[F] = True
-    return used
+def _remarks(thin: Indices, turned: Mask) -> tuple[Notice, ...]:
+    """Return notices of slivers, and of triangles that were reversed, if there are any."""
+    texts = {}
+    if len(thin):
+        texts[NoticeKind.SLIVERS] = (
+            f"slivers, with less area than {SLIVER_AREA:g} of their longest edge squared: triangle "
+            f"{some(thin)}; energies and dilatations lose digits in rounding there"
+        )
+    if turned.any():
+        count = f"{turned.sum()} of {len(turned)} triangles were turned over"
+        texts[NoticeKind.ORIENTATION_REPAIRED] = f"orientation repaired: {count}"
+    return tuple(Notice(kind, text) for kind, text in texts.items())
 
 
 #: What is wrong, by defect, where a list of vertices or triangles says all: `some` are the first of
@@ -566,26 +539,21 @@ def _edges(F: Indices, contradictions: Indices) -> list[Problem]:
         return []
     edges, faces = topology.undirected_edges(F)
     bad = np.flatnonzero(faces > 2)
-    if not len(bad):
-        return [_one_sided(contradictions, closed=bool((faces == 2).all()))]
-    i, j = edges[bad[0]].tolist()
-    message = (
-        f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
-        f"{i}-{j} with {faces[bad[0]]}"
-    )
-    return [Problem(Defect.edges, len(bad), message)]
-
-
-def _one_sided(contradictions: Indices, *, closed: bool) -> Problem:
-    """Return the problem that a surface with manifold edges is one-sided."""
+    if len(bad):
+        i, j = edges[bad[0]].tolist()
+        message = (
+            f"non-manifold edge: {len(bad)} edge(s) have more than two triangles, the first being "
+            f"{i}-{j} with {faces[bad[0]]}"
+        )
+        return [Problem(Defect.edges, len(bad), message)]
     i, j = contradictions[0].tolist()
+    closed = (faces == 2).all()
     kind = "closed and one-sided (like a Klein bottle)" if closed else "one-sided (like a Moebius"
-    return Problem(
-        Defect.one_sided,
-        len(contradictions),
-        f"the surface is {kind}{'' if closed else ' strip)'}: the triangles at edge {i}-{j} "
-        "cannot be oriented consistently; a repair cuts the surface there",
+    message = (
+        f"the surface is {kind}{'' if closed else ' strip)'}: the triangles at edge {i}-{j} cannot "
+        "be oriented consistently; a repair cuts the surface there"
     )
+    return [Problem(Defect.one_sided, len(contradictions), message)]
 
 
 def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
@@ -605,5 +573,5 @@ def _vertices(F: Indices, n: int, *, consistent: bool) -> Problem | None:
         import igl
 
         manifold = igl.is_vertex_manifold(proper)  # also false for vertices in no triangle
-        bad = np.flatnonzero(~manifold & _used(proper, len(manifold)))
+        bad = np.flatnonzero(~manifold & marked(len(manifold), proper))
     return _problem(Defect.vertices, bad)

@@ -27,7 +27,7 @@ SLOWEST = 2**12
 #: Bytes of a file whose publisher states no size.
 LARGEST = 2**31
 #: How often a server may name another address.
-MOST_REDIRECTS = 10
+MAX_REDIRECTS = 10
 _CHUNK, _WAITING_CHUNKS, _STEP = 2**12, 256, 0.1
 
 
@@ -176,7 +176,7 @@ def _answer(url: str, timeout: float) -> Response:
     import requests
 
     with requests.Session() as session:
-        for _ in range(MOST_REDIRECTS):
+        for _ in range(MAX_REDIRECTS):
             asked = session.prepare_request(
                 requests.Request("GET", url, headers={"Accept-Encoding": "identity"})
             )
@@ -187,4 +187,4 @@ def _answer(url: str, timeout: float) -> Response:
                 return answer
             answer.close()
             url = urljoin(url, target)
-    raise DownloadError(f"the server names another address {MOST_REDIRECTS} times")
+    raise DownloadError(f"the server names another address {MAX_REDIRECTS} times")

@@ -29,7 +29,7 @@ from cembench.core.names import did_you_mean
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.defects import array_of, check_finite, located, representatives
 from cembench.mesh.formats import gii, gltf, mat, npz, obj, off, ply, stl, vtk
-from cembench.mesh.formats.apart import apart
+from cembench.mesh.formats.isolated import isolated
 from cembench.mesh.repair import Repaired, repair
 from cembench.mesh.soup import Soup, Texture, complex_of
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh, TriangleMesh
@@ -41,19 +41,19 @@ READERS: dict[str, Callable[..., Soup]] = {
     ".off": off.read,
     ".ply": ply.read,
     ".stl": stl.read,
-    ".mat": apart(mat.read, Extra.FORMATS, "scipy"),
+    ".mat": isolated(mat.read, Extra.FORMATS, "scipy"),
     ".npz": npz.read,
-    ".vtk": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
-    ".vtu": apart(vtk.read, Extra.FORMATS, "meshio", "vtk"),
-    ".vtp": apart(vtk.read, Extra.VTP, "vtk"),
-    ".vts": apart(vtk.read, Extra.VTP, "vtk"),
-    ".glb": apart(gltf.read, Extra.FORMATS, "trimesh"),
-    ".gltf": apart(gltf.read, Extra.FORMATS, "trimesh"),
-    ".gii": apart(gii.read, Extra.FORMATS, "nibabel"),
+    ".vtk": isolated(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtu": isolated(vtk.read, Extra.FORMATS, "meshio", "vtk"),
+    ".vtp": isolated(vtk.read, Extra.VTP, "vtk"),
+    ".vts": isolated(vtk.read, Extra.VTP, "vtk"),
+    ".glb": isolated(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gltf": isolated(gltf.read, Extra.FORMATS, "trimesh"),
+    ".gii": isolated(gii.read, Extra.FORMATS, "nibabel"),
 }
 #: How FreeSurfer geometry begins, whose file names have endings of any kind, and FreeSurfer values.
 _FREESURFER, _VALUES = (b"\xff\xff\xfe", b"\xff\xff\xfd"), b"\xff\xff\xff"
-_read_freesurfer = apart(gii.read_freesurfer, Extra.FORMATS, "nibabel")
+_read_freesurfer = isolated(gii.read_freesurfer, Extra.FORMATS, "nibabel")
 #: Files of other kinds, by the end of their names, and how a surface is made of them.
 _NO_SURFACES = {
     (".nii", ".nii.gz", ".mgz", ".mgh"): (
@@ -166,9 +166,9 @@ def read_soup(
 def _library_reader(suffix: str) -> Callable[..., Soup] | None:
     """Return the reader of a format that only an installed library knows, or None."""
     if suffix in (".3mf", ".dae") and find_spec("trimesh"):
-        return apart(gltf.read, Extra.FORMATS, "trimesh")
+        return isolated(gltf.read, Extra.FORMATS, "trimesh")
     if suffix in (".msh", ".mesh", ".inp") and find_spec("meshio"):
-        return apart(vtk.read_by_meshio, Extra.FORMATS, "meshio")
+        return isolated(vtk.read_by_meshio, Extra.FORMATS, "meshio")
     return None
 
 
@@ -199,9 +199,9 @@ def _check_file(path: Path) -> None:
     for ends, what in _NO_SURFACES.items():
         if path.name.lower().endswith(ends):
             raise MeshError(f"{what}.")
+    with path.open("rb") as file:
+        begin = file.read(3)
     if not is_named_like_a_mesh(path):
-        with path.open("rb") as file:
-            begin = file.read(3)
         if begin == _VALUES:
             raise MeshError(
                 "it holds FreeSurfer values of vertices, such as a thickness; name the file of the "
@@ -214,11 +214,10 @@ def _check_file(path: Path) -> None:
             )
     if status.st_size == 0:
         raise MeshError("the file is empty (0 bytes). Export or download it again.")
-    with path.open("rb") as file:
-        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
-            raise MeshError(
-                "it is text in UTF-16, as `>` of Windows PowerShell 5 writes it. Save it as UTF-8."
-            )
+    if begin.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        raise MeshError(
+            "it is text in UTF-16, as `>` of Windows PowerShell 5 writes it. Save it as UTF-8."
+        )
 
 
 def read_mesh(
@@ -267,8 +266,7 @@ def read_mesh(
     """
     soup = read_soup(path, arrays=arrays, polygons=polygons)
     kinds: Any = (DiskMesh, HoledMesh) if mesh_type is None else (mesh_type,)
-    mesh: M = most_special(soup, kinds, Path(path))
-    return mesh
+    return most_special(soup, kinds, Path(path))
 
 
 def most_special(soup: Soup, kinds: Sequence[type[M]], path: Path | None = None) -> M:
@@ -313,10 +311,8 @@ def repair_soup(soup: Soup, path: Path | None = None, **options: Any) -> Repaire
     if path is not None and copies is None and path.suffix.lower() in _WITH_UV_OF_VERTICES:
         with suppress(MeshError):  # of texture coordinates, which a repair can do without
             copies = _has_uv_of_vertices(read_soup(path, uv=True)) or None
-    try:
+    with located(path):
         return repair(soup.V, soup.corners, soup.sizes, copies=copies, **options)
-    except MeshError as error:
-        raise located(error, path) from None
 
 
 def _has_uv_of_vertices(soup: Soup) -> bool:
@@ -351,9 +347,8 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
         text = f"{polygons} polygons were cut into triangles"
         notices += (Notice(NoticeKind.POLYGONS_CUT, text),)
     try:
-        return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
-    except MeshError as error:
-        raise located(error, path) from None
+        with located(path):
+            return mesh_type.from_arrays(soup.V, soup.triangles, name=soup.name, notices=notices)
     except MemoryError as error:
         raise MeshError(
             f"{path or soup.name}: memory does not suffice to check {len(soup.V):,} vertices and "
@@ -393,16 +388,10 @@ def write_mesh(
     >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
 
     """
-    path = Path(path)
-    try:
-        n = mesh.n
-        allowed = (
-            f"one value for each of the {n} vertices: complex, shape ({n},), or real, "
-            f"shape ({n}, 2)"
-        )
+    path, n = Path(path), mesh.n
+    allowed = f"one value for each of the {n} vertices: complex, shape ({n},), or real, ({n}, 2)"
+    with located(path):
         z = None if uv is None else complex_images(uv, [(n,)], allowed)
-    except MeshError as error:
-        raise located(error, path) from None
     write_soup(path, Soup.of_triangles(mesh.V, mesh.F, z, name=mesh.name))
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Real
+from cembench.core.arrays import Indices, Mask, Real
 
 
 class Independence:
@@ -21,7 +20,7 @@ class Independence:
     def __init__(self, m: int) -> None:
         self._first = np.empty(m, dtype=np.int64)
 
-    def __call__(self, left: Indices, right: Indices) -> NDArray[np.bool_]:
+    def __call__(self, left: Indices, right: Indices) -> Mask:
         """Return the selected edges (k,), given the triangles on either side, best edges first.
 
         An edge is selected if no earlier edge has either of its triangles.
@@ -30,8 +29,7 @@ class Independence:
         self._first[left] = self._first[right] = len(left)
         for triangles in (left, right):
             np.minimum.at(self._first, triangles, order)
-        free: NDArray[np.bool_] = (self._first[left] == order) & (self._first[right] == order)
-        return free
+        return (self._first[left] == order) & (self._first[right] == order)
 
 
 def distance_across(base: Real, left: Real, right: Real, left2: Real, right2: Real) -> Real:
@@ -55,8 +53,7 @@ def area_of_sides(a: Real, b: Real, c: Real) -> Real:
     z, x = np.minimum(low, c), np.maximum(high, c)
     y = np.maximum(low, np.minimum(high, c))
     product = (x + (y + z)) * (z - (x - y)) * (z + (x - y)) * (x + (y - z))
-    area: Real = 0.25 * np.sqrt(np.maximum(product, 0))
-    return area
+    return 0.25 * np.sqrt(np.maximum(product, 0))
 
 
 def _foot_and_height(base: Real, left: Real, right: Real) -> tuple[Real, Real]:

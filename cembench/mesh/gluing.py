@@ -11,10 +11,9 @@ triangle, as in :mod:`cembench.mesh.topology`.
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
 from cembench.core.arrays import Indices
-from cembench.mesh.topology import half_edges
+from cembench.mesh.topology import half_edges, linked
 
 #: Places a vertex has in a table of the edges to later vertices, about three on average.
 SLOTS = 8
@@ -106,8 +105,7 @@ def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     start = np.where(alike, right, following[right])
     end = np.where(alike, following[right], right)
     i, j = np.concatenate([left, following[left]]), np.concatenate([start, end])
-    graph = scipy.sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(F.size, F.size))
-    _, fan = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    _, fan = linked(i, j, F.size)
     first = np.unique(fan, return_index=True)[1]  # one corner of each fan
     owner = vertex[first]
     order = np.lexsort((first, owner))

@@ -19,9 +19,9 @@ from cembench.mesh.side_lengths import side_lengths
 #: An edge is flipped if the cosines of its opposite angles sum to less than this.
 SURELY = -1e-10
 #: Maximal number of rounds; the edges of a round share no triangle.
-MOST_ROUNDS = 20_000
+MAX_ROUNDS = 20_000
 #: Small meshes of needles flip for ever, since their angles have no digits: they get fewer.
-LEAST_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
+MIN_ROUNDS, ROUNDS_AN_EDGE = 1000, 10
 
 
 @dataclass
@@ -93,7 +93,7 @@ class Triangulation:
         h = np.arange(len(self.twin)) if among is None else among
         h = h[h < self.twin[h]]
         sums = self._cosine(h, u) + self._cosine(self.twin[h], u)
-        most = min(MOST_ROUNDS, LEAST_ROUNDS + ROUNDS_AN_EDGE * len(self.twin) // 2)
+        most = min(MAX_ROUNDS, MIN_ROUNDS + ROUNDS_AN_EDGE * len(self.twin) // 2)
         moved = np.arange(len(self.twin))
         for _ in range(most):
             bad = (sums < SURELY) & (h // 3 != self.twin[h] // 3)
@@ -102,7 +102,8 @@ class Triangulation:
             h = h[bad][np.argsort(sums[bad], kind="stable")]
             flipped = apart(h // 3, self.twin[h] // 3)
             chosen = h[flipped]
-            before = np.concatenate([3 * x[:, None] + np.arange(3) for x in self._beside(chosen)])
+            beside = chosen // 3, self.twin[chosen] // 3
+            before = np.concatenate([3 * x[:, None] + np.arange(3) for x in beside])
             self._flip(chosen, moved, flat=flat)
             around = np.concatenate([moved[h[~flipped]], before.ravel()])
             moved[before.ravel()] = before.ravel()
@@ -110,10 +111,6 @@ class Triangulation:
             h = around[np.diff(around, prepend=-1) > 0]
             sums = self._cosine(h, u) + self._cosine(self.twin[h], u)
         raise AlgorithmFailed(f"edges are still being flipped after {most} rounds")
-
-    def _beside(self, h: Indices) -> tuple[Indices, Indices]:
-        """Return the triangles on either side of half-edges."""
-        return h // 3, self.twin[h] // 3
 
     def _cosine(self, h: Indices, u: Real) -> Real:
         """Return the cosine of the angle opposite to half-edges in Euclidean triangles."""

@@ -10,9 +10,8 @@ corner, makes no unnecessary flat triangles, and does not depend on which corner
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Indices, Mask, Points
 from cembench.core.blocks import blocks
 
 #: A triangle is flat if its area is below this share of its polygon's; single precision leaves less
@@ -73,7 +72,7 @@ def _of_one_size(V: Points, polygons: Indices) -> Indices:
     return triangles
 
 
-def _all_inside(V: Points, polygons: Indices, triangles: Indices) -> NDArray[np.bool_]:
+def _all_inside(V: Points, polygons: Indices, triangles: Indices) -> Mask:
     """Whether each of these triangles of a polygon has an area and the polygon's orientation."""
     P = np.ascontiguousarray(V.take(polygons.T, axis=0).transpose(2, 0, 1))
     with np.errstate(all="ignore"):  # of vertices that no surface can have

@@ -12,9 +12,9 @@ from enum import StrEnum
 from typing import Any, Literal, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Indices, Mask, Points, marked
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh import topology
@@ -83,10 +83,6 @@ class Step(StrEnum):
     isolated = "isolated_vertices_removed", "isolated vertices removed"
 
 
-#: Description of each step for messages.
-TITLES: dict[str, str] = {step: step.meaning for step in Step}
-
-
 class Kept(NamedTuple):
     """How much of a surface a repair keeps."""
 
@@ -132,7 +128,7 @@ class Repaired:
     @property
     def notices(self) -> tuple[Notice, ...]:
         """One notice for each step that changed something, and what is kept if not all is."""
-        texts = [f"{n:,} {TITLES[step]}" for step, n in self.steps.items() if n]
+        texts = [f"{n:,} {step.meaning}" for step, n in self.steps.items() if n]
         if self.kept.area < _TOLD or not self.kept.is_whole:
             texts.append(f"{self.kept} are kept")
         return tuple(Notice(NoticeKind.REPAIRED, f"repaired: {text}") for text in texts)
@@ -351,8 +347,7 @@ def _triangles(
     polygon = np.repeat(np.arange(len(sizes)), sizes)
     finite = np.append(np.isfinite(V).all(axis=1), False)
     inside = (corners >= 0) & (corners < len(V))
-    bad = np.zeros(len(sizes), dtype=bool)
-    bad[polygon[~finite[np.where(inside, corners, -1)]]] = True
+    bad = marked(len(sizes), polygon[~finite[np.where(inside, corners, -1)]])
     corners, sizes = corners[~bad[polygon]], sizes[~bad]
     steps[Step.invalid_faces] = int(bad.sum())
     steps[Step.polygons] = int((sizes > 3).sum())
@@ -427,7 +422,7 @@ def _repair_degenerate(
     return F[keep], face[keep]
 
 
-def _repeats_a_vertex(F: Indices) -> NDArray[np.bool_]:
+def _repeats_a_vertex(F: Indices) -> Mask:
     """Whether each triangle has a vertex twice."""
     return np.asarray((np.roll(F, 1, axis=1) == F).any(axis=1))
 
@@ -552,7 +547,7 @@ def _orient(F: Indices, n: int, steps: dict[Step, int]) -> tuple[Indices, Indice
     return glue(F, pairs[agree], n)
 
 
-def _agreeing(F: Indices) -> tuple[Indices, NDArray[np.bool_]]:
+def _agreeing(F: Indices) -> tuple[Indices, Mask]:
     """Return the pairs of half-edges (k, 2), and whether the two triangles of each agree."""
     _, edge, faces = edges_of_half_edges(F)
     pairs = paired_half_edges(edge, faces)
@@ -585,8 +580,7 @@ def _outwards(V: Points, F: Indices, steps: dict[Step, int]) -> Indices:
     count, label = topology.components(F, len(V))
     piece = label[F[:, 0]]
     _, edge, faces = edges_of_half_edges(F)
-    closed = np.ones(count, dtype=bool)
-    closed[np.repeat(piece, 3)[faces[edge] == 1]] = False
+    closed = ~marked(count, np.repeat(piece, 3)[faces[edge] == 1])
     centre = V - V[F].mean(axis=(0, 1))
     a, b, c = (centre[F[:, k]] for k in range(3))
     volume = np.bincount(piece, np.einsum("td,td->t", a, np.cross(b, c)), minlength=count)
@@ -608,7 +602,7 @@ def _components(F: Indices, n: int, wanted: Components, steps: dict[Step, int]) 
     return [by_piece[k] for k in order]
 
 
-def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.bool_]:
+def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> Mask:
     """Whether each triangle stays when ears, with two sides on the boundary, are dropped.
 
     Those of holes fold in a map to a disk with round holes. Those of the outer boundary, the widest
@@ -629,7 +623,7 @@ def _without_ears(V: Points, F: Indices, steps: dict[Step, int]) -> NDArray[np.b
     return keep
 
 
-def _ears(F: Indices) -> NDArray[np.bool_]:
+def _ears(F: Indices) -> Mask:
     """Whether each triangle has two sides or three on the boundary."""
     _, edge, faces = edges_of_half_edges(F)
     return np.asarray((faces[edge] == 1).reshape(-1, 3).sum(axis=1) >= 2)

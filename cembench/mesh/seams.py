@@ -8,12 +8,11 @@ is welded, the second kept. :func:`are_copies` tells them apart by the numbering
 from __future__ import annotations
 
 import numpy as np
-import scipy
 
-from cembench.core.arrays import Indices, Points
+from cembench.core.arrays import Indices, Points, marked
 from cembench.mesh.defects import LARGEST_LENGTH, representatives
 from cembench.mesh.gluing import edges_of_half_edges
-from cembench.mesh.topology import boundary_loops
+from cembench.mesh.topology import boundary_loops, first_of_linked
 
 #: Boundary vertices closer than this share of the largest coordinate coincide up to rounding:
 #: sin(2 pi) is not 0.
@@ -40,12 +39,8 @@ def coincident_vertices(V: Points, F: Indices) -> Indices:
     near = rim[representatives(V[rim], _ROUNDING * largest)]
     if (near == first[rim]).all():
         return first
-    i, j = np.arange(len(V)), first
-    graph = scipy.sparse.coo_array(
-        (np.ones(len(i) + len(rim)), (np.r_[i, rim], np.r_[j, near])), shape=(len(V), len(V))
-    )
-    _, place = scipy.sparse.csgraph.connected_components(graph, directed=False)
-    return np.unique(place, return_index=True)[1][place]
+    every = np.arange(len(V))
+    return first_of_linked(np.r_[every, rim], np.r_[first, near], len(V))
 
 
 def are_copies(F: Indices, first: Indices) -> bool:
@@ -69,8 +64,7 @@ def are_copies(F: Indices, first: Indices) -> bool:
 
     """
     at, counts = first[F], np.bincount(first)
-    joined = np.zeros(len(counts), dtype=bool)
-    joined[at[at == np.roll(at, 1, axis=1)]] = True
+    joined = marked(len(counts), at[at == np.roll(at, 1, axis=1)])
     lone = np.bincount(first, np.bincount(F.ravel(), minlength=len(first)) == 1) == counts
     if 1 <= np.count_nonzero((joined | lone) & (counts >= _POLE)) <= 2:
         return True

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from cembench.core.arrays import Indices, Real
 
 
-def side_lengths(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.float64]:
+def side_lengths(V: Real, F: Indices) -> Real:
     """Return the length of the side opposite to each corner.
 
     Parameters
@@ -22,11 +23,10 @@ def side_lengths(V: NDArray[np.float64], F: NDArray[np.int64]) -> NDArray[np.flo
         In the unit of V. Side c runs from corner c + 1 to corner c + 2 (modulo 3).
 
     """
-    lengths: NDArray[np.float64] = np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
-    return lengths
+    return np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
 
 
-def loop_width(loop: NDArray[np.float64]) -> float:
+def loop_width(loop: Real) -> float:
     """Return the mean square distance of a closed polygon's points (k, 3) from their centroid."""
     after, middle = np.roll(loop, -1, axis=0), (loop + np.roll(loop, -1, axis=0)) / 2
     lengths = np.linalg.norm(after - loop, axis=1)

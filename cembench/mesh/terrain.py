@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from cembench.core.arrays import Points
+from cembench.core.arrays import Mask, Points
 from cembench.core.errors import MeshError
 from cembench.mesh.soup import Soup
 
@@ -60,7 +60,7 @@ def soup_of_heights(z: ArrayLike, x: ArrayLike | None = None, y: ArrayLike | Non
     around = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
     quads = np.stack([side.ravel() for side in around], axis=1)
     V = np.stack([X.ravel(), Y.ravel(), heights.ravel()], axis=1)
-    finite: NDArray[np.bool_] = np.asarray(np.isfinite(V).all(axis=1))
+    finite: Mask = np.asarray(np.isfinite(V).all(axis=1))
     quads = quads[finite[quads].all(axis=1)]
     if not len(quads):
         raise MeshError("no four neighbouring heights are finite: there is no surface.")

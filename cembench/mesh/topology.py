@@ -11,17 +11,16 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Faces = NDArray[np.int64]
+from cembench.core.arrays import Indices
 
 
-def half_edges(F: Faces) -> Faces:
+def half_edges(F: Indices) -> Indices:
     """Return the directed edges (3m, 2) of the faces; rows 3t, 3t+1, 3t+2 belong to face t."""
     return F[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
 
-def undirected_edges(F: Faces) -> tuple[Faces, NDArray[np.int64]]:
+def undirected_edges(F: Indices) -> tuple[Indices, Indices]:
     """Return the edges (e, 2), smaller index first, and the face count of each (e,)."""
     ends = np.sort(half_edges(F), axis=1)
     stride = int(F.max()) + 1
@@ -29,7 +28,7 @@ def undirected_edges(F: Faces) -> tuple[Faces, NDArray[np.int64]]:
     return np.stack([keys // stride, keys % stride], axis=1), faces
 
 
-def repeated_half_edges(F: Faces) -> Faces:
+def repeated_half_edges(F: Indices) -> Indices:
     """Return the directed edges of more than one face; none if orientations agree."""
     stride = int(F.max()) + 1
     keys = (F * stride + F[:, [1, 2, 0]]).ravel()
@@ -38,7 +37,7 @@ def repeated_half_edges(F: Faces) -> Faces:
     return np.stack([keys // stride, keys % stride], axis=1)
 
 
-def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
+def vertex_graph(F: Indices, n: int) -> scipy.sparse.csr_array:
     """Return the adjacency matrix (n, n) of the vertices; its values are meaningless."""
     i, j = half_edges(F).T
     ones = np.ones(len(i))
@@ -47,21 +46,31 @@ def vertex_graph(F: Faces, n: int) -> scipy.sparse.csr_array:
     ).tocsr()
 
 
-def components(F: Faces, n: int) -> tuple[int, NDArray[np.int64]]:
+def components(F: Indices, n: int) -> tuple[int, Indices]:
     """Return the number of connected components of triangles or edges, and that of each vertex."""
     # Two sides connect the corners of a triangle, one the ends of an edge.
-    i, j = np.repeat(F[:, 0], F.shape[1] - 1), F[:, 1:].ravel()
-    graph = scipy.sparse.coo_array((np.ones(len(i)), (i, j)), shape=(n, n))
+    return linked(np.repeat(F[:, 0], F.shape[1] - 1), F[:, 1:].ravel(), n)
+
+
+def linked(i: Indices, j: Indices, n: int) -> tuple[int, Indices]:
+    """Return the number of pieces of n points that are linked in pairs i, j, and that of each."""
+    graph = scipy.sparse.coo_array((np.ones(len(i), dtype=bool), (i, j)), shape=(n, n))
     count, labels = scipy.sparse.csgraph.connected_components(graph, directed=False)
     return int(count), labels.astype(np.int64)
 
 
-def euler_characteristic(F: Faces, n: int) -> int:
+def first_of_linked(i: Indices, j: Indices, n: int) -> Indices:
+    """Return the first point of the piece of each of n points that are linked in pairs i, j."""
+    _, piece = linked(i, j, n)
+    return np.unique(piece, return_index=True)[1][piece]
+
+
+def euler_characteristic(F: Indices, n: int) -> int:
     """Return V - E + F: 1 for a disk, 2 for a sphere, 2 - 2 g - b in general."""
     return n - len(undirected_edges(F)[0]) + len(F)
 
 
-def genus(F: Faces, n: int, loops: Sequence[Faces]) -> int:
+def genus(F: Indices, n: int, loops: Sequence[Indices]) -> int:
     """Return the genus of a connected oriented surface with these boundary loops.
 
     Each of its E edges has two half-edges, or one on the boundary, so no edges need be sorted.
@@ -70,7 +79,7 @@ def genus(F: Faces, n: int, loops: Sequence[Faces]) -> int:
     return (2 - len(loops) - (n - edges + len(F))) // 2
 
 
-def boundary_half_edges(F: Faces, n: int) -> Faces:
+def boundary_half_edges(F: Indices, n: int) -> Indices:
     """Return the half-edges (k, 2) without a twin.
 
     Around an interior vertex every neighbour is once the next corner of a face and once the
@@ -91,7 +100,7 @@ def boundary_half_edges(F: Faces, n: int) -> Faces:
     return near[~twinned]
 
 
-def boundary_loops(F: Faces, n: int) -> list[NDArray[np.int64]]:
+def boundary_loops(F: Indices, n: int) -> list[Indices]:
     """Return the closed curves that bound the surface.
 
     Each is an array of vertices in order, with the surface on its left, starting at its smallest

@@ -15,8 +15,9 @@ from typing import Any, Self
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from cembench.core.arrays import Indices, Real, marked
 from cembench.core.clock import phase
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.names import printable
@@ -39,7 +40,7 @@ from cembench.mesh.repair import repair
 from cembench.mesh.side_lengths import loop_width
 
 #: Boundary loops, each as its vertices in order.
-Loops = Sequence[NDArray[np.int64]]
+Loops = Sequence[Indices]
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -74,8 +75,8 @@ class TriangleMesh:
 
     """
 
-    V: NDArray[np.float64]
-    F: NDArray[np.int64]
+    V: Real
+    F: Indices
     name: str = "mesh"
     notices: tuple[Notice, ...] = ()
 
@@ -114,9 +115,7 @@ class TriangleMesh:
         self._set(V, F, printable(name), notices)
         self.__dict__["loops"] = tuple(loops)
 
-    def _set(
-        self, V: NDArray[np.float64], F: NDArray[np.int64], name: str, notices: tuple[Notice, ...]
-    ) -> None:
+    def _set(self, V: Real, F: Indices, name: str, notices: tuple[Notice, ...]) -> None:
         for field, value in (("V", V), ("F", F), ("name", name), ("notices", notices)):
             object.__setattr__(self, field, value)
 
@@ -129,11 +128,7 @@ class TriangleMesh:
 
     @classmethod
     def trusted(
-        cls,
-        V: NDArray[np.float64],
-        F: NDArray[np.int64],
-        name: str = "mesh",
-        notices: tuple[Notice, ...] = (),
+        cls, V: Real, F: Indices, name: str = "mesh", notices: tuple[Notice, ...] = ()
     ) -> Self:
         """Return a mesh of arrays that were checked before, without checking them."""
         mesh = cls.__new__(cls)
@@ -162,9 +157,7 @@ class TriangleMesh:
         return self.trusted(V, self.F, self.name, self.notices)
 
     @classmethod
-    def _check_topology(
-        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
-    ) -> tuple[Notice, ...]:
+    def _check_topology(cls, V: Real, F: Indices, loops: Loops) -> tuple[Notice, ...]:
         """Raise if the surface is not of this class; return notices for the user."""
         return ()
 
@@ -183,13 +176,13 @@ class TriangleMesh:
         return len(self.F)
 
     @cached_property
-    def loops(self) -> tuple[NDArray[np.int64], ...]:
+    def loops(self) -> tuple[Indices, ...]:
         """Boundary loops, each in order with the surface on its left."""
         with phase("boundary"):
             return tuple(topology.boundary_loops(self.F, self.n))
 
     @cached_property
-    def interior(self) -> NDArray[np.int64]:
+    def interior(self) -> Indices:
         """Indices i of the vertices on no boundary loop, ascending."""
         inside = np.ones(self.n, dtype=bool)
         for loop in self.loops:
@@ -238,14 +231,12 @@ class DiskMesh(TriangleMesh):
     """
 
     @property
-    def boundary(self) -> NDArray[np.int64]:
+    def boundary(self) -> Indices:
         """Indices of the boundary vertices in order, counter-clockwise (surface on the left)."""
         return self.loops[0]
 
     @classmethod
-    def _check_topology(
-        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
-    ) -> tuple[Notice, ...]:
+    def _check_topology(cls, V: Real, F: Indices, loops: Loops) -> tuple[Notice, ...]:
         return _check_planar(F, len(V), loops, [_holes(V, loops)] if len(loops) > 1 else [])
 
 
@@ -282,9 +273,7 @@ class HoledMesh(TriangleMesh):
 
     """
 
-    def outer_and_holes(
-        self, outer: int | None = None
-    ) -> tuple[NDArray[np.int64], tuple[NDArray[np.int64], ...]]:
+    def outer_and_holes(self, outer: int | None = None) -> tuple[Indices, tuple[Indices, ...]]:
         """Return the outer boundary loop, and the holes.
 
         The outer loop is that of the vertex `outer`, or the widest by the mean square distance of
@@ -330,9 +319,7 @@ class HoledMesh(TriangleMesh):
         return loops.pop(chosen[0]), tuple(loops)
 
     @classmethod
-    def _check_topology(
-        cls, V: NDArray[np.float64], F: NDArray[np.int64], loops: Loops
-    ) -> tuple[Notice, ...]:
+    def _check_topology(cls, V: Real, F: Indices, loops: Loops) -> tuple[Notice, ...]:
         text = (
             "the surface has a single boundary loop; this needs an outer boundary and at least one "
             "hole"
@@ -342,10 +329,7 @@ class HoledMesh(TriangleMesh):
 
 
 def _when_repaired(
-    kind: type[TriangleMesh],
-    V: NDArray[np.float64],
-    F: NDArray[np.int64],
-    known: tuple[Problem, ...],
+    kind: type[TriangleMesh], V: Real, F: Indices, known: tuple[Problem, ...]
 ) -> tuple[tuple[Problem, ...], dict[str, Any]]:
     """Return the problems that would keep the surface from its class after a repair.
 
@@ -375,9 +359,7 @@ def _of_cut(problem: Problem) -> Problem:
     return replace(problem, text=f"once it is cut, {problem.text}", other_remedy=Remedy.cut)
 
 
-def _check_planar(
-    F: NDArray[np.int64], n: int, loops: Loops, problems: list[Problem]
-) -> tuple[Notice, ...]:
+def _check_planar(F: Indices, n: int, loops: Loops, problems: list[Problem]) -> tuple[Notice, ...]:
     """Raise if there are problems, no boundary loop, or handles; return notices for the user."""
     if not loops:
         text = "the surface is closed: it has no boundary loop, and a map to the disk needs one"
@@ -388,22 +370,21 @@ def _check_planar(
     return definition_1_notices(F, n, loops)
 
 
-def _holes(V: NDArray[np.float64], loops: Loops) -> Problem:
+def _holes(V: Real, loops: Loops) -> Problem:
     """Return the problem that a surface has several boundary loops."""
     sizes = sorted(map(len, loops), reverse=True)
     lengths = [np.linalg.norm(V[loop] - V[np.roll(loop, 1)], axis=1).sum() for loop in loops]
     longest = int(np.argmax(lengths))
-    return Problem(
-        Defect.holes,
-        len(loops) - 1,
+    edges = max(len(loop) for k, loop in enumerate(loops) if k != longest)
+    text = (
         f"the surface has {len(loops)} boundary loops (of {', '.join(map(str, sizes[:5]))}"
         f"{', ...' if len(loops) > 5 else ''} vertices); this needs a topological disk, with "
-        "exactly one",
-        edges=max(len(loop) for k, loop in enumerate(loops) if k != longest),
+        "exactly one"
     )
+    return Problem(Defect.holes, len(loops) - 1, text, edges)
 
 
-def _handles(F: NDArray[np.int64], n: int, loops: Loops) -> list[Problem]:
+def _handles(F: Indices, n: int, loops: Loops) -> list[Problem]:
     """Return the problem that a surface has handles, if it has."""
     genus = topology.genus(F, n, loops)
     if not genus:
@@ -416,16 +397,15 @@ def _handles(F: NDArray[np.int64], n: int, loops: Loops) -> list[Problem]:
     return [Problem(Defect.handles, genus, text)]
 
 
-def definition_1_notices(F: NDArray[np.int64], n: int, loops: Loops) -> tuple[Notice, ...]:
+def definition_1_notices(F: Indices, n: int, loops: Loops) -> tuple[Notice, ...]:
     """Return notices on where the mesh breaks the paper's Definition 1 (well-conditioned)."""
     broken = _breaks_of_definition_1(F, n, loops)
     return tuple(Notice(NoticeKind.DEFINITION_1, f"Definition 1 {where}") for where in broken)
 
 
-def _breaks_of_definition_1(F: NDArray[np.int64], n: int, loops: Loops) -> Iterator[str]:
+def _breaks_of_definition_1(F: Indices, n: int, loops: Loops) -> Iterator[str]:
     """Yield a text for each condition of Definition 1 that the mesh breaks."""
-    inside = np.ones(n, dtype=bool)
-    inside[np.concatenate(loops)] = False
+    inside = ~marked(n, np.concatenate(loops))
     if not inside.any():
         yield "(ii), (iv) broken: the mesh has no interior vertex"
         return

@@ -69,10 +69,10 @@ def estimate(cell: Cell, faces: int, records: Iterable[Record]) -> Estimate:
     basis: Basis = "recorded" if same else "other sizes" if known else "rough"
     call = law.at(faces)
     peaks = [(size, float(peak)) for size, _, peak, _ in same or known if peak]
-    memory = (
-        max(_bytes_at(faces, size, peak) for size, peak in peaks)
-        if peaks
-        else _usual_bytes(cell.algorithm, faces)
+    # Proportional to the triangles above an empty process, and a record's at least.
+    memory = max(
+        (peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1) for size, peak in peaks),
+        default=_usual_bytes(cell.algorithm, faces),
     )
     check = START_SECONDS + call + CHECK_SECONDS_A_FACE * faces
     start = FORK_SECONDS if can_fork(cell.threads) else START_SECONDS
@@ -104,11 +104,6 @@ def planned_seconds(costs: Sequence[Estimate], budget: float | None) -> float:
     if budget is None:
         return everything
     return max(sum(cost.least_seconds for cost in costs), min(everything, budget))
-
-
-def _bytes_at(faces: float, size: float, peak: float) -> float:
-    """Return bytes, proportional to the triangles above an empty process, at least a record's."""
-    return peak + max(0.0, peak - ROUGH_BYTES) * max(0.0, faces / size - 1)
 
 
 def law_through(points: Sequence[tuple[float, float]]) -> PowerLaw:

@@ -31,7 +31,7 @@ from cembench.running.processor import children, keep_orphans
 #: Placeholder in the server's environment, as long as the mark that a forked process writes there.
 _NO_MARK = "0" * 32
 #: Seconds within which what a process left is ended; what starts processes faster stays.
-_MOST_SECONDS = 5.0
+_MAX_SECONDS = 5.0
 
 
 class ServerGoneError(Exception):
@@ -149,17 +149,11 @@ class _Forked:
         return self.code
 
 
-@dataclass(frozen=True)
-class _ForkRequest:
-    """The job of a forked process, and its mark."""
+def _serve() -> dict[str, str]:
+    """Answer requests on standard input, one per line; return that of each forked process in it.
 
-    job: str
-    log: str
-    mark: str
-
-
-def _serve() -> _ForkRequest:
-    """Answer requests on standard input, one per line; return in every forked process."""
+    Such a request has the job's file, the log and the mark.
+    """
     requests = os.fdopen(0, "rb", buffering=0, closefd=False)
     child, code, cpu = 0, None, 0
     _say(0, None)
@@ -176,7 +170,7 @@ def _serve() -> _ForkRequest:
             continue
         child, code = os.fork(), None
         if not child:
-            return _ForkRequest(**request)
+            return request
         with suppress(OSError):  # already done by the child, or the child has ended
             os.setpgid(child, child)
         _say(number, child)
@@ -188,7 +182,7 @@ def _end_children() -> None:
 
     One may have left its group, its environment and its limits, and be a new process every moment.
     """
-    until = monotonic() + _MOST_SECONDS
+    until = monotonic() + _MAX_SECONDS
     with suppress(ChildProcessError):  # none is left
         while monotonic() < until:
             while os.waitpid(-1, os.WNOHANG)[0]:
@@ -202,12 +196,12 @@ def _say(number: int, answer: int | None) -> None:
     os.write(1, json.dumps([number, answer]).encode() + b"\n")
 
 
-def _set_up_process(order: _ForkRequest) -> None:
+def _set_up_process(order: dict[str, str]) -> None:
     """Join a new process group, set the mark, close the input, and write to the log."""
     os.setpgid(0, 0)
     for file, way, targets in (
         (os.devnull, os.O_RDONLY, (0,)),
-        (order.log, os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
+        (order["log"], os.O_WRONLY | os.O_APPEND | os.O_CREAT, (1, 2)),
     ):
         opened = os.open(file, way)
         for target in targets:
@@ -216,8 +210,8 @@ def _set_up_process(order: _ForkRequest) -> None:
     # Overwrites the placeholder where the system reads the environment of a process.
     getenv = ctypes.CDLL(None).getenv
     getenv.restype = ctypes.c_void_p
-    ctypes.memmove(getenv(MARK.encode()), order.mark.encode(), len(_NO_MARK))
-    os.environ[MARK] = order.mark
+    ctypes.memmove(getenv(MARK.encode()), order["mark"].encode(), len(_NO_MARK))
+    os.environ[MARK] = order["mark"]
     np.random.seed()  # noqa: NPY002 - of the global generator; Python's own is seeded by the fork
 
 
@@ -239,7 +233,7 @@ def _main(parent: int, backend: str) -> None:
     _load(backend)
     order = _serve()
     _set_up_process(order)
-    worker.main(Path(order.job))
+    worker.main(Path(order["job"]))
     worker.end()
 
 

@@ -39,10 +39,8 @@ def surface_and_uv(
     if named and not more:
         soup = read_with_uv(Path(surface))
         assert soup.uv is not None
-        try:
+        with located(Path(surface)):
             return _usable(soup, np.append(soup.uv, np.nan)[uv_numbers(soup)])  # NO_UV is the last
-        except MeshError as error:
-            raise located(error, Path(surface)) from None
     whole = load_surface(surface, (TriangleMesh,)) if named else surface
     soup = soup_of((whole, more[0]) if len(more) == 2 else whole)
     uv = more[-1] if more else _texture_coordinates(surface)

@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-import numpy as np
 import psutil
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from cembench.core.arrays import Complex
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.results.records import Record
 from cembench.running.environment import describe_environment
@@ -54,12 +53,12 @@ def numerical_threads(count: int) -> Iterator[None]:
         yield
 
 
-def map_here(task: Task) -> tuple[Record, NDArray[np.complex128] | None]:
+def map_here(task: Task) -> tuple[Record, Complex | None]:
     """Call once in this process, and keep nothing on disk; see :func:`local.map_once`."""
     return _recorded(task, check_cell)
 
 
-def overlay_here(task: Task) -> tuple[Record, TriangleMesh, NDArray[np.complex128] | None]:
+def overlay_here(task: Task) -> tuple[Record, TriangleMesh, Complex | None]:
     """Map a surface on the algorithm's refinement of it, in this process; also return that."""
     return _recorded(task, check_overlay)
 

@@ -14,7 +14,7 @@ import shutil
 import sys
 import threading
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from cembench.core.arrays import Complex
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.backends import default_backend
 from cembench.results.records import Fault, FaultKind, Outcome, Status, not_ok
@@ -40,32 +41,25 @@ JUDGE_SECONDS = 600.0
 LARGEST_ANSWER_BYTES = 2**24
 
 
+@dataclass(eq=False)
 class Launcher:
     """Starts processes, one at a time.
 
-    `scratch` is the folder for exchanging files with them. They are forked where `forks` allows it
-    and the system can; the server ends with :meth:`close`, and the next process gets a new one.
-    `number` is that of the server for judges: launchers that run in parallel have different ones.
-    `stopped` may be shared by launchers that are stopped together.
+    They are forked where `forks` allows it and the system can; the server ends with :meth:`close`,
+    and the next process gets a new one.
     """
 
-    def __init__(
-        self,
-        scratch: Path,
-        options: Options,
-        *,
-        forks: bool = True,
-        number: int = 0,
-        stopped: threading.Event | None = None,
-    ) -> None:
-        self.scratch = scratch
-        self.options = options
-        self.forks = forks
-        self.number = number
-        self.stopped = stopped or threading.Event()
-        self._server: ForkServer | None = None
-        #: Status of the mesh files when they were written.
-        self._written: dict[Path, tuple[int, ...]] = {}
+    #: The folder for exchanging files with processes.
+    scratch: Path
+    options: Options
+    forks: bool = True
+    #: That of the server for judges: launchers that run in parallel have different ones.
+    number: int = 0
+    #: Shared by launchers that are stopped together.
+    stopped: threading.Event = field(default_factory=threading.Event)
+    _server: ForkServer | None = None
+    #: Status of the mesh files when they were written.
+    _written: dict[Path, tuple[int, ...]] = field(default_factory=dict)
 
     def close(self) -> None:
         """End the server, if there is one."""
@@ -101,7 +95,8 @@ class Launcher:
             **more,
         )
         limits = Limits(seconds, self.options.memory_bytes)
-        ending = (self._by_judges if judges else self._forked)(job, limits, log)
+        server = judges_server(self.number) if judges else self._own_server(job)
+        ending = server and self._forked(server, job, limits, log, alone=judges)
         ending = ending or self._started(job, limits, log)
         with suppress(OSError):  # the folder may be gone
             remove(programs)  # of a program that was ended
@@ -123,7 +118,7 @@ class Launcher:
         """Return the judgement of a map, by a process that never imported its algorithm."""
         return self.run(task, what, max(self.options.timeout, JUDGE_SECONDS), **more)
 
-    def read_uv(self, task: Task) -> NDArray[np.complex128] | None:
+    def read_uv(self, task: Task) -> Complex | None:
         """Return the map that the last process left, if any; raise ValueError if it is no map."""
         if not self.uv_file.exists():
             return None
@@ -146,8 +141,8 @@ class Launcher:
         start = spawning(command, for_measuring(job.cell.threads))
         return run_limited(start, limits, log, stopped=self.stopped.is_set)
 
-    def _forked(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """Run a process forked from the server; return its end, None if it cannot fork."""
+    def _own_server(self, job: Job) -> ForkServer | None:
+        """Return the server of processes with this job's back end; None if none can be forked."""
         if not self.forks or not can_fork(job.cell.threads):
             return None
         if self._server is None or self._server.backend != job.cell.backend:
@@ -156,32 +151,23 @@ class Launcher:
                 self._server = ForkServer(for_measuring(job.cell.threads), job.cell.backend)
             except ServerGoneError:
                 self.forks = False
-                return None
-        ending = self._run_by(self._server, job, limits, log)
-        if ending is None:
-            self.close()
-        return ending
+        return self._server
 
-    def _by_judges(self, job: Job, limits: Limits, log: Path) -> ProcessEnd | None:
-        """Run a judge forked from its server; return how it ended, None if it cannot be forked."""
-        server = judges_server(self.number)
-        if server is None:
-            return None
-        ending = self._run_by(server, job, limits, log, alone=True)
-        if ending is None:
-            judges_server.cache_clear()
-            server.close()
-        return ending
-
-    def _run_by(
-        self, server: ForkServer, job: Job, limits: Limits, log: Path, *, alone: bool = False
+    def _forked(
+        self, server: ForkServer, job: Job, limits: Limits, log: Path, *, alone: bool
     ) -> ProcessEnd | None:
         """Run a process forked from this server; return its end, None if the server is gone."""
         path = self._write(job.model_copy(update={"parent": server.pid}))
-        with suppress(ServerGoneError):
+        try:
             start = server.forking(path)
             end = run_limited(start, limits, log, alone=alone, stopped=self.stopped.is_set)
             return replace(end, cpu_seconds=server.cpu_seconds())
+        except ServerGoneError:
+            if server is self._server:
+                self.close()
+            else:
+                judges_server.cache_clear()
+                server.close()
         return None
 
     def _write(self, job: Job) -> Path:

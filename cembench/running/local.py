@@ -25,9 +25,7 @@ from pathlib import Path
 from time import monotonic
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arrays import Complex
 from cembench.core.errors import RecordError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.results.comparison import circumstances
@@ -49,7 +47,7 @@ from cembench.running.schedule import (
     CellState,
     each_round,
     in_random_order,
-    look,
+    interim_check,
     over_budget,
     scatter_probe,
     sharing_groups,
@@ -87,9 +85,7 @@ def run_tasks(
     return [recorder.records[task.cell.label] for task in tasks]
 
 
-def map_once(
-    task: Task, options: Options | None = None
-) -> tuple[Record, NDArray[np.complex128] | None]:
+def map_once(task: Task, options: Options | None = None) -> tuple[Record, Complex | None]:
     """Call once in a process of its own, without warm-up, and keep nothing on disk.
 
     The map is given if it has the right shape and is finite.
@@ -124,7 +120,7 @@ class _Run:
     #: Whether cells that are compared also share a process in each round, and why some do not, by
     #: their circumstances.
     pairs: bool = False
-    apart: dict[str, str] = field(default_factory=dict)
+    unpaired: dict[str, str] = field(default_factory=dict)
 
     @property
     def options(self) -> Options:
@@ -198,9 +194,7 @@ class _Run:
         finally:
             self.watcher.ends(task, step, monotonic() - since)
 
-    def _save_check(
-        self, state: CellState, outcome: Outcome, uv: NDArray[np.complex128] | None
-    ) -> None:
+    def _save_check(self, state: CellState, outcome: Outcome, uv: Complex | None) -> None:
         state.samples.save_check(outcome, uv)
         state.check = outcome
         self._resume_after_check(state)
@@ -219,7 +213,7 @@ class _Run:
     def _end_cells(self, cells: Sequence[CellState], number: int) -> None:
         """End the cells that are precise, or for which no time is left, before this round."""
         if is_look(number, self.options.most_rounds):
-            ended, continued = look(cells, number, self.options, self._seconds_left())
+            ended, continued = interim_check(cells, number, self.options, self._seconds_left())
             for state, reason in ended:
                 self._save_measured(state, reason)
             more = next_look(number, self.options.most_rounds) - number
@@ -289,7 +283,7 @@ class _Run:
         Afterwards the cells have only their own processes, which show which cell is at fault.
         """
         key = circumstances(cells[0].task.cell)
-        if key in self.apart:
+        if key in self.unpaired:
             return {}
         since = monotonic()
         checked = [Checked.of(state.passed) for state in cells]
@@ -299,7 +293,7 @@ class _Run:
             state.seconds[-1] += each
             self.watcher.took(state.task, each)
         if isinstance(rounds, Outcome):
-            self.apart[key] = f"round {number + 1}: {rounds.cause}"
+            self.unpaired[key] = f"round {number + 1}: {rounds.cause}"
             return {}
         return {state.label: one.calls for state, one in zip(cells, rounds, strict=True)}
 
@@ -349,7 +343,7 @@ class _Run:
         rounds = tuple(state.rounds[number] for number in sorted(state.rounds))
         outcome = state.passed.model_copy(update={"rounds": rounds, "ended": ended})
         notes = (*outcome.notes, *_notes(outcome))
-        why = self.apart.get(circumstances(state.task.cell))
+        why = self.unpaired.get(circumstances(state.task.cell))
         if why is not None:
             text = f"not compared within one process, which could not be used in {why}"
             notes = (*notes, Notice(NoticeKind.NOT_TOGETHER, text))

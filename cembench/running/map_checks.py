@@ -16,7 +16,6 @@ from statistics import median_low
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from cembench.conformal.atlas import atlas_metrics
@@ -51,7 +50,7 @@ SCATTER = 10.0
 #: How many times that of the check the E_C of the timed maps may be; the check's counts as this
 #: share of the area at least. Where symmetry or the numbering decides, as for LDM, it is up to five
 #: times that in a call.
-FAR_WORSE, LEAST_ENERGY = 10.0, 1e-4
+FAR_WORSE, MIN_ENERGY = 10.0, 1e-4
 #: Names of first calls that are not timed: the first warms up, a second is for comparison only.
 WARM_UP, SECOND_CALL = "the warm-up", "the second call"
 #: Maximum number of entries of a map that are kept for comparisons.
@@ -84,7 +83,7 @@ class JudgedCalls(BaseModel):
     #: Whether all compared maps agree to rounding; None if none could be compared.
     repeated: bool | None = None
     #: The largest difference from a known map of the same motion, relative to its size.
-    apart: float | None = None
+    difference: float | None = None
     #: Whether a turn, a scale and a shift do not explain that difference.
     differs: bool = False
     #: The median E_C over area of the timed maps; None where it is not compared.
@@ -96,16 +95,16 @@ def sample(uv: Complex) -> Complex:
     return np.array(uv[:: max(1, -(-len(uv) // SAMPLED))])
 
 
-def kept_from_call_to_call(apart: float, scatter: float) -> Fault | None:
+def kept_from_call_to_call(difference: float, scatter: float) -> Fault | None:
     """Return the fault that a process with earlier calls maps in another way than fresh ones.
 
-    `apart` is the difference between their maps of one surface; `scatter` is the largest one seen
-    between fresh processes, which is 0 for a deterministic solver.
+    `difference` is that between their maps of one surface, `scatter` the largest one seen between
+    fresh processes: 0 for a deterministic solver.
     """
-    if apart <= max(SAME_MAP, SCATTER * scatter):
+    if difference <= max(SAME_MAP, SCATTER * scatter):
         return None
     message = (
-        f"maps of the same surface differ by {apart:.2g} between a fresh process and one with "
+        f"maps of the same surface differ by {difference:.2g} between a fresh process and one with "
         f"earlier calls, but by {scatter:.2g} at most between fresh ones: results are kept from "
         "call to call"
     )
@@ -178,11 +177,11 @@ def judged_calls(
         only_energy = wrong and wrong[0].kind is FaultKind.OTHER_ENERGY
         other = known.get(motion)
         if other is not None:
-            apart = difference(mine, other)
-            repeated = repeated is not False and apart <= SAME_MAP
-            far = max(far or 0.0, apart)
+            away = difference(mine, other)
+            repeated = repeated is not False and away <= SAME_MAP
+            far = max(far or 0.0, away)
             differs |= difference(*_aligned(mine, other)) > SAME_MAP
-            if apart <= SAME_MAP and only_energy:
+            if away <= SAME_MAP and only_energy:
                 wrong = []
         elif only_energy:
             near = any(difference(mine, one) <= NEARLY_THE_SAME for one in known.values())
@@ -197,7 +196,7 @@ def judged_calls(
         kept=worse,
         doubtful=doubtful,
         repeated=repeated,
-        apart=far,
+        difference=far,
         differs=differs,
         energy=typical,
     )
@@ -252,7 +251,7 @@ def _other_energy(energy: float, checked: float) -> list[Fault]:
 
 def _far_worse(energy: float | None, checked: float | None) -> tuple[Fault, ...]:
     """Return the fault that timed maps are far worse than the check's, if they are."""
-    if energy is None or checked is None or energy <= FAR_WORSE * max(checked, LEAST_ENERGY):
+    if energy is None or checked is None or energy <= FAR_WORSE * max(checked, MIN_ENERGY):
         return ()
     message = (
         f"E_C over the area of the timed maps is {energy:.3g}, of the checked one {checked:.3g}: "
@@ -305,7 +304,7 @@ def _warnings_ignored() -> Iterator[None]:
         yield
 
 
-def _boundaries(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> tuple[Boundary, ...]:
+def _boundaries(mesh: TriangleMesh, uv: Complex) -> tuple[Boundary, ...]:
     circles = boundary_circles(mesh, uv) if len(mesh.loops) > 1 else ()
     if not all(np.isfinite(circle.centre) for circle in circles):
         return ()

@@ -17,7 +17,6 @@ from __future__ import annotations
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
 
 from cembench.conformal.atlas import AtlasFigures, cut_map
@@ -28,7 +27,7 @@ from cembench.conformal.metrics import (
     image_area,
 )
 from cembench.conformal.planar import crossing_polygons, polygon_area, turns, winding_words
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.triangle_mesh import TriangleMesh, definition_1_notices
 from cembench.registry import Algorithm, Target
@@ -147,7 +146,7 @@ def _fault(kind: FaultKind, detail: str) -> Fault:
     return Fault(kind=kind, detail=detail)
 
 
-def _outer(mesh: TriangleMesh, uv: Complex) -> NDArray[np.int64]:
+def _outer(mesh: TriangleMesh, uv: Complex) -> Indices:
     return max(mesh.loops, key=lambda loop: polygon_area(uv[loop]))
 
 

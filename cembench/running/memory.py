@@ -44,8 +44,7 @@ def resident_bytes() -> int:
     """Return the current resident memory of this process."""
     import psutil
 
-    resident: int = psutil.Process().memory_info().rss
-    return resident
+    return psutil.Process().memory_info().rss
 
 
 def peak_memory_bytes() -> int | None:

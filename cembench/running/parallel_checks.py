@@ -8,14 +8,12 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import AbstractContextManager
 from queue import SimpleQueue
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arrays import Complex
 from cembench.results.records import Outcome
 from cembench.running.schedule import CellState
 from cembench.running.timing import CellTimer
 
-Checked = tuple[Outcome, NDArray[np.complex128] | None]
+Checked = tuple[Outcome, Complex | None]
 
 
 def check_in_parallel(

@@ -27,7 +27,7 @@ import psutil
 from cembench.running.processor import running_threads
 
 #: Seconds between two looks at the memory. Each look uses milliseconds of another core.
-LOOK_EVERY = 0.1
+POLL_SECONDS = 0.1
 #: Number of bytes kept from the end of a process's output.
 KEPT_OUTPUT_BYTES = 4000
 #: An output file larger than this is emptied.
@@ -147,7 +147,7 @@ def run_limited(
         inherited = _mark_by_limit(tree[process.pid], mark)
     deadline = monotonic() + limits.seconds
     try:
-        while not _ended_within(process, min(LOOK_EVERY, max(deadline - monotonic(), 0))):
+        while not _ended_within(process, min(POLL_SECONDS, max(deadline - monotonic(), 0))):
             _follow(tree, process.pid)
             seen = max(seen, sum(map(_resident_bytes, tree.values())))
             running.append(sum(map(running_threads, tree)))

@@ -26,7 +26,7 @@ _RUNS = b"R"
 STARTING = 1.0
 #: A process has started when so many looks, so many seconds apart, find it asleep; for so long a
 #: call's new processes are waited for at most.
-_ASLEEP, _LOOK_EVERY, _MOST_SECONDS = 3, 0.005, 5.0
+_ASLEEP, _POLL_SECONDS, _MAX_SECONDS = 3, 0.005, 5.0
 
 
 @dataclass(frozen=True)
@@ -92,9 +92,9 @@ def after_call(before: Processor | None = None) -> Processor:
 
 def _wait_for(started: Collection[int]) -> None:
     """Wait until these processes sleep, or have ended."""
-    until, asleep = monotonic() + _MOST_SECONDS, 0
+    until, asleep = monotonic() + _MAX_SECONDS, 0
     while started and asleep < _ASLEEP and monotonic() < until:
-        sleep(_LOOK_EVERY)
+        sleep(_POLL_SECONDS)
         asleep = 0 if any(map(running_threads, started)) else asleep + 1
 
 

@@ -13,7 +13,6 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.bordered import BorderedLaplacian
@@ -32,7 +31,7 @@ from cembench.conformal.metrics import (
     flipped_triangles,
 )
 from cembench.conformal.planar import polygon_area, signed_areas
-from cembench.core.arrays import Complex
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.errors import AlgorithmFailed
 from cembench.core.notices import Notice, NoticeKind
 from cembench.linear_algebra.cholesky import Cholesky
@@ -264,7 +263,7 @@ def yardstick(target: str, figures: MapFigures) -> Complex | None:
     return None
 
 
-def _by_harmonic_measure(mesh: DiskMesh, half_cotangents: NDArray[np.float64]) -> Complex:
+def _by_harmonic_measure(mesh: DiskMesh, half_cotangents: Real) -> Complex:
     L = by_rows(laplacian_of_weights(mesh.F, half_cotangents, mesh.n))
     i, b = mesh.interior, mesh.boundary
     if not len(i):
@@ -279,7 +278,7 @@ def _by_harmonic_measure(mesh: DiskMesh, half_cotangents: NDArray[np.float64]) -
     return uv
 
 
-def _by_filled_start(mesh: HoledMesh, outer: NDArray[np.int64]) -> Complex:
+def _by_filled_start(mesh: HoledMesh, outer: Indices) -> Complex:
     outer, holes = mesh.outer_and_holes(int(outer[0]))
     loops = (outer, *holes)
     bordered = BorderedLaplacian(mesh, laplacian(mesh), loops)

@@ -9,9 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from cembench.core.arrays import Complex
 from cembench.results.records import Outcome, Record
 from cembench.results.store import Store
 from cembench.running.environment import describe_environment
@@ -66,7 +64,7 @@ class Recorder:
         self,
         task: Task,
         record: Record,
-        uv: NDArray[np.complex128] | None,
+        uv: Complex | None,
         environment: dict[str, Any] | None = None,
     ) -> None:
         """Save a record with its map, measured in this environment (default: this machine)."""

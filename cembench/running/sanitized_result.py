@@ -39,10 +39,10 @@ from cembench.running.map_promises import broken_premises
 #: Maximum length of a stored traceback, in characters.
 LONGEST_TRACEBACK = 20_000
 #: Maximum numbers of iterations, energies and phases, and maximum bytes of extras as JSON.
-MOST_ITERATIONS = 2**53
-MOST_ENERGIES = 100_000
-MOST_PHASES = 100
-MOST_EXTRAS_BYTES = 1_000_000
+MAX_ITERATIONS = 2**53
+MAX_ENERGIES = 100_000
+MAX_PHASES = 100
+MAX_EXTRAS_BYTES = 1_000_000
 #: What a result's class must leave to `object`: how attributes are looked up.
 _OF_OBJECT = ("__getattribute__", "__getattr__")
 
@@ -132,8 +132,8 @@ def phases_fault(timing: Timing) -> Fault | None:
     """Return the fault in the seconds and phases of a call, or None."""
     names, seconds = list(timing.phases), [timing.total, *timing.phases.values()]
     message = ""
-    if len(names) > MOST_PHASES:
-        message = f"it reports {len(names)} phases; allowed are at most {MOST_PHASES}"
+    if len(names) > MAX_PHASES:
+        message = f"it reports {len(names)} phases; allowed are at most {MAX_PHASES}"
     elif not all(
         isinstance(name, str) and len(name) <= 100 and shortened(name) == name for name in names
     ):
@@ -175,15 +175,15 @@ def _iterations(value: Any) -> int:
         count = operator.index(value)
     except TypeError:
         raise _WrongReportError(f"is {_shown(value)}; required is an integer") from None
-    if not 0 <= count <= MOST_ITERATIONS:
+    if not 0 <= count <= MAX_ITERATIONS:
         raise _WrongReportError(f"is {_shown(value)}; allowed is 0 to 2^53")
     return count
 
 
 def _energies(values: Any) -> tuple[float, ...]:
-    energies = list(islice(values, MOST_ENERGIES + 1))
-    if len(energies) > MOST_ENERGIES:
-        raise _WrongReportError(f"holds more than {MOST_ENERGIES:,} energies")
+    energies = list(islice(values, MAX_ENERGIES + 1))
+    if len(energies) > MAX_ENERGIES:
+        raise _WrongReportError(f"holds more than {MAX_ENERGIES:,} energies")
     for k, energy in enumerate(energies):
         if not isinstance(energy, Real) or not math.isfinite(energy):
             raise _WrongReportError(
@@ -201,10 +201,9 @@ def _extras(value: Any) -> dict[str, Any]:
         text = to_json(value, inf_nan_mode="null")
     except Exception as error:
         raise _WrongReportError(f"cannot be written as JSON: {describe_error(error)}") from None
-    if len(text) > MOST_EXTRAS_BYTES:
-        raise _WrongReportError(f"takes {len(text):,} bytes; allowed are {MOST_EXTRAS_BYTES:,}")
-    plain: dict[str, Any] = json.loads(text)
-    return plain
+    if len(text) > MAX_EXTRAS_BYTES:
+        raise _WrongReportError(f"takes {len(text):,} bytes; allowed are {MAX_EXTRAS_BYTES:,}")
+    return json.loads(text)
 
 
 def _type_of(value: Any) -> str:

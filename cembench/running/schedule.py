@@ -140,7 +140,7 @@ def partners_of(cells: Sequence[Cell], reference: str) -> dict[str, str]:
     }
 
 
-def look(
+def interim_check(
     cells: Sequence[CellState], number: int, options: Options, seconds_left: float
 ) -> tuple[list[tuple[CellState, Ended]], list[CellState]]:
     """Return the cells that end after `number` rounds, with the reason, and those that continue.
@@ -302,10 +302,7 @@ def cheapest(
 
 
 def _within(
-    ordered: Sequence[str],
-    costs: Mapping[str, float],
-    partners: Mapping[str, str],
-    seconds: float,
+    ordered: Sequence[str], costs: Mapping[str, float], partners: Mapping[str, str], seconds: float
 ) -> set[str]:
     """Return the cells that can be paid for, in this order, each with its partner."""
     chosen: set[str] = set()

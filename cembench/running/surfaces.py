@@ -143,10 +143,8 @@ def prepared(
         soup, repaired = repaired_soup(soup, path)
     if cut:
         uncut = checked(soup, TriangleMesh, path)
-        try:
+        with located(path):
             opened = cut_open(uncut)
-        except MeshError as error:
-            raise located(error, path) from None
         return SurfaceFile(file, opened.mesh, repaired, uncut, opened)
     return SurfaceFile(file, most_special(soup, kinds, path), repaired)
 
@@ -165,8 +163,7 @@ def generate_surface(registry: Registry, name: str, faces: int | None = None) ->
     """Generate a registered surface with about `faces` triangles, or at its own size."""
     family = registry.surface(name)
     sizes = {} if faces is None else {"faces": faces}
-    mesh: TriangleMesh = family.function(**family.arguments(sizes))
-    return mesh
+    return family.function(**family.arguments(sizes))
 
 
 def file_named(path: Path, registry: Registry) -> Path:

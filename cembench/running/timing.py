@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 from os import urandom
 from pathlib import Path
 from time import monotonic
-from typing import Any, Self
+from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.names import file_name
 from cembench.results.records import Fault, FaultKind, Outcome, Round, Status, not_ok
 from cembench.running.estimate import expected_bytes
@@ -49,7 +49,7 @@ from cembench.running.timing_checks import impossible, incomparable
 from cembench.running.worker import Part, TimedPart
 
 #: Number of new processes that are asked, at most, how far maps of a randomised solver scatter.
-_MOST_ASKED = 3
+_MAX_ASKED = 3
 
 
 @dataclass
@@ -80,7 +80,7 @@ class CellTimer:
         forks: bool = True,
         stopped: threading.Event | None = None,
     ) -> None:
-        self.launcher = Launcher(scratch, options, forks=forks, stopped=stopped)
+        self.launcher = Launcher(scratch, options, forks, stopped=stopped or threading.Event())
         self._cells: dict[str, _History] = {}
         self._numbering = urandom(6).hex()
 
@@ -96,13 +96,8 @@ class CellTimer:
         for number in range(1, jobs + 1):
             judges_server(number)
             timer = copy(self)
-            timer.launcher = Launcher(
-                own.scratch / f"checks-{number}",
-                options,
-                forks=own.forks,
-                number=number,
-                stopped=own.stopped,
-            )
+            scratch = own.scratch / f"checks-{number}"
+            timer.launcher = Launcher(scratch, options, own.forks, number, own.stopped)
             timers.append(timer)
         return timers
 
@@ -114,7 +109,7 @@ class CellTimer:
         """End the server from which processes are forked; the next process gets a new one."""
         self.launcher.close()
 
-    def check(self, task: Task) -> tuple[Outcome, NDArray[np.complex128] | None]:
+    def check(self, task: Task) -> tuple[Outcome, Complex | None]:
         """Return the outcome of one call, and its map if it is finite and of the right shape.
 
         A large surface that needs more than the memory limit by estimate is not tried.
@@ -177,9 +172,8 @@ class CellTimer:
             judged = self._judge(task, known, timed)
             if isinstance(judged, Outcome):
                 return judged
-            about: dict[str, Any] = {"motions": "; ".join(timed.motions)}
-            about |= {"repeated": judged.repeated, "energy": judged.energy}
-            about |= {"differs": judged.differs}
+            about = judged.model_dump(include={"repeated", "energy", "differs"})
+            about["motions"] = "; ".join(timed.motions)
             judged_rounds.append(timed.round.model_copy(update=about))
         return judged_rounds
 
@@ -238,7 +232,9 @@ class CellTimer:
             status: Status = "invalid" if judged.faults else "not_comparable"
             return not_ok(status, *judged.faults, *stored)
         # Of a cell's first process the call whose surface kept its numbers, else any timed one.
-        number = 1 if SECOND_CALL in timed.names else _any_timed(timed)
+        first = int(timed.names[0] == WARM_UP)
+        number = random.SystemRandom().randrange(first, len(timed.names))
+        number = 1 if SECOND_CALL in timed.names else number
         self._remember(task, timed.motions[number], self._map_of_call(task, timed, number))
         return judged
 
@@ -255,12 +251,12 @@ class CellTimer:
         )
         return answer.judged or answer.outcome or unreadable("its maps could not be judged")
 
-    def _map_of_call(self, task: Task, timed: TimedPart, number: int) -> NDArray[np.complex128]:
+    def _map_of_call(self, task: Task, timed: TimedPart, number: int) -> Complex:
         """Return the map of a call in the surface's own order."""
         rows = np.lib.format.open_memmap(self.launcher.uv_file, mode="r")
         return in_first_order(np.array(rows[number]), task.mesh, timed.motions[number])
 
-    def _again(self, task: Task, motion: str) -> NDArray[np.complex128] | Outcome:
+    def _again(self, task: Task, motion: str) -> Complex | Outcome:
         """Return a sample of the map that a new process makes of the surface in this motion."""
         file = self.launcher.uv_file
         maps = file.with_name("maps.npy")
@@ -280,13 +276,13 @@ class CellTimer:
         Where the maps of both processes differ, new ones are asked how far theirs do.
         """
         history, motion = self._history(task), timed.motions[0]
-        if judged.apart is None or judged.faults or task.algorithm.program is not None:
+        if judged.difference is None or judged.faults or task.algorithm.program is not None:
             return ()
         if motion == UNMOVED:  # the check was a new process too
-            history.scatter = judged.apart
+            history.scatter = judged.difference
             return ()
-        for _ in range(_MOST_ASKED):
-            if kept_from_call_to_call(judged.apart, history.scatter) is None:
+        for _ in range(_MAX_ASKED):
+            if kept_from_call_to_call(judged.difference, history.scatter) is None:
                 return ()
             again = self._again(task, motion)
             if isinstance(again, Outcome):
@@ -295,10 +291,10 @@ class CellTimer:
             history.scatter = max(scatter, history.scatter)
             if scatter <= SAME_MAP:
                 break
-        fault = kept_from_call_to_call(judged.apart, history.scatter)
+        fault = kept_from_call_to_call(judged.difference, history.scatter)
         return () if fault is None else (fault,)
 
-    def _remember(self, task: Task, motion: str, uv: NDArray[np.complex128]) -> None:
+    def _remember(self, task: Task, motion: str, uv: Complex) -> None:
         """Store a sample of the map of this motion for the next process of the cell."""
         file = self.launcher.scratch / f"{file_name(task.cell.label)}.npy"
         save_array(file, sample(uv))
@@ -310,10 +306,6 @@ def _as_asked(timed: TimedPart, part: Part) -> bool:
     told = timed.motions
     every = len(told) == len(timed.names) == len(set(told))
     return every and len(told) <= len(part.motions) and all(map(may_be, told, part.motions))
-
-
-def _any_timed(timed: TimedPart) -> int:
-    return random.SystemRandom().randrange(int(timed.names[0] == WARM_UP), len(timed.names))
 
 
 def _too_large(faces: int, expected: float, limit: int) -> Fault:

@@ -25,7 +25,7 @@ LEFT, PREPARING = 0.5, 3.0
 #: Looks, as a number and a share, that find more threads running than allowed: at least so many,
 #: and more than that share. A program and what starts it run side by side for a moment, which one
 #: look in forty meets; a call of a few hundredths of a second has seven.
-LEAST_CROWDED, CROWDED = 4, 0.2
+MIN_CROWDED, CROWDED = 4, 0.2
 #: Tolerated difference between two processes reading the same clock, in seconds, and CPU seconds
 #: that the system may have beyond those that a process reports, for its end; MORE is their share.
 CLOCKS_APART, ENDING = 0.05, 0.05
@@ -79,7 +79,7 @@ def incomparable(used: Used, running: Sequence[int], threads: int) -> list[Fault
         )
         reasons.append(Fault(kind=FaultKind.MORE_CORES, detail=message))
     crowded = [count for count in running if count > threads]
-    often = len(crowded) >= LEAST_CROWDED and len(crowded) > CROWDED * len(running)
+    often = len(crowded) >= MIN_CROWDED and len(crowded) > CROWDED * len(running)
     if not reasons and often and used.helping > BESIDE * used.wall + LITTLE:
         message = (
             f"{max(crowded)} threads or processes were running at the same time, in "

@@ -16,7 +16,6 @@ from time import monotonic
 from typing import Literal, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel
 
 from cembench.core.errors import MeshError
@@ -27,7 +26,7 @@ from cembench.results.records import Cell, Fault, Outcome, Round
 from cembench.running.external.call import use_folder
 from cembench.running.map_checks import Checked, JudgedCalls, judged_calls, judged_check
 from cembench.running.map_promises import Promise
-from cembench.running.measure import Timed, TimedCalls, call_cell, preparing_seconds, timed_together
+from cembench.running.measure import Timed, call_cell, preparing_seconds, timed_together
 from cembench.running.process import die_with_parent, limit_memory
 from cembench.running.processor import after_call, keep_orphans
 from cembench.running.relay import RELAYS, end_solvers, start_solver
@@ -161,14 +160,8 @@ def _check(job: Job) -> Answer:
 def _time(job: Job) -> Answer:
     began, preparing = monotonic(), preparing_seconds(_as_large(job))
     cells = [
-        Timed(
-            _loaded(part.cell, part.plugins),
-            part.cell,
-            part.motions,
-            part.first_counts,
-            part.untimed,
-        )
-        for part in job.parts
+        Timed(_loaded(p.cell, p.plugins), p.cell, p.motions, p.first_counts, p.untimed)
+        for p in job.parts
     ]
     # Read only now: an algorithm that is imported could prepare for its surface.
     result = timed_together(_mesh(job), cells)
@@ -183,16 +176,13 @@ def _time(job: Job) -> Answer:
         used.disturbed = 0  # a process that has answered may still be about to sleep
     parts = []
     for part, (measured, timed) in zip(job.parts, each, strict=True):
-        np.save(part.uv_file, _maps(timed))
+        maps = [call.uv for call in timed.calls if not isinstance(call.uv, Fault)]
+        np.save(part.uv_file, np.stack(maps))
         motions = tuple(call.motion for call in timed.calls)
         parts.append(TimedPart(round=measured, names=tuple(timed.names()), motions=motions))
     end_solvers()
     used.everything = after_call().total
     return Answer(parts=tuple(parts), used=used)
-
-
-def _maps(timed: TimedCalls) -> NDArray[np.complex128]:
-    return np.stack([call.uv for call in timed.calls if not isinstance(call.uv, Fault)])
 
 
 def _judge_check(job: Job) -> Answer:

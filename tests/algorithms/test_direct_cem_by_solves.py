@@ -126,7 +126,7 @@ def test_the_estimate_is_monotonic():
 
 @pytest.mark.parametrize(
     ("name", "value"),
-    [("MOST_STEPS", 0), ("LEAST_AGREEMENT", 1e6)],
+    [("MAX_STEPS", 0), ("MIN_AGREEMENT", 1e6)],
     ids=["too many steps", "steps that lower the energy less than predicted"],
 )
 def test_what_it_gives_up_is_mapped_the_usual_way_to_the_bit(way, monkeypatch, name, value):

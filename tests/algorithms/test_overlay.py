@@ -94,7 +94,7 @@ def test_parameterize_returns_and_writes_the_refined_surface(tmp_path):
 def test_edges_that_cross_too_often_end_the_refinement(monkeypatch):
     """Where a surface winds, the edges of both triangulations cross without a useful limit."""
     monkeypatch.setattr("cembench.algorithms.cetm.crossings.MOST", 3)
-    monkeypatch.setattr("cembench.algorithms.cetm.crossings.MOST_OF_AN_EDGE", 0)
+    monkeypatch.setattr("cembench.algorithms.cetm.crossings.MAX_OF_AN_EDGE", 0)
     with pytest.raises(AlgorithmFailed, match="cross the flipped ones more than 3 times"):
         refined_map(bumpy())
 

@@ -258,7 +258,7 @@ def test_points_with_uvs_and_no_faces_are_no_surface(tmp_path):
 
 
 def test_overlaps_that_cannot_be_told_are_not_called_none(monkeypatch):
-    monkeypatch.setattr("cembench.conformal.planar.MOST_CROSSINGS", -(10**9))
+    monkeypatch.setattr("cembench.conformal.planar.MAX_CROSSINGS", -(10**9))
     V, F, uv = square(3)
     found = cembench.measure(V, F, uv)
     assert found.metrics["overlap_between_islands"] is None

@@ -116,7 +116,7 @@ def test_arcs_at_their_least_length_do_not_become_shorter(ring):
 
 def test_with_too_many_arcs_at_their_least_length_it_stops(ring, monkeypatch):
     _, _, S, domain, weights = ring
-    monkeypatch.setattr(boundary_energy, "MOST_HELD", 0)
+    monkeypatch.setattr(boundary_energy, "MAX_HELD", 0)
     stuck = replace(in_gauge(domain, weights), least=0.999 * in_gauge(domain, weights).arcs)
     result = minimise(S, stuck, weights, tolerance=1e-7, max_iterations=50)
     assert result.reason == "crowded"

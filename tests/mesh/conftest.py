@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cembench.mesh.formats import apart
+from cembench.mesh.formats import isolated
 from tests.forked import forked
 
 
@@ -18,9 +18,9 @@ def forked_readers(monkeypatch):
     def run(command, check, timeout, **streams):
         assert timeout > 60
         assert set(streams.values()) == {subprocess.DEVNULL}
-        assert command[:4] == [sys.executable, "-P", "-m", apart.__name__]
+        assert command[:4] == [sys.executable, "-P", "-m", isolated.__name__]
         with Path(os.devnull).open("r+b") as nowhere:
-            code = forked(lambda: apart._main(*command[4:]), [nowhere] * 3)
+            code = forked(lambda: isolated._main(*command[4:]), [nowhere] * 3)
         return subprocess.CompletedProcess(command, code)
 
-    monkeypatch.setattr(apart.subprocess, "run", run)
+    monkeypatch.setattr(isolated.subprocess, "run", run)

@@ -14,7 +14,7 @@ from cembench.core.extras import Extra, MissingExtra
 from cembench.core.notices import NoticeKind
 from cembench.mesh import files
 from cembench.mesh.files import read_mesh, read_soup, write_mesh
-from cembench.mesh.formats import apart
+from cembench.mesh.formats import isolated
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 
@@ -207,8 +207,8 @@ def test_a_library_that_never_ends_is_stopped(tmp_path, monkeypatch):
     (tmp_path / "endless.py").write_text("def read(path):\n    while True:\n        pass\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     monkeypatch.syspath_prepend(tmp_path)
-    monkeypatch.setattr(apart, "_SECONDS", 2.0)
-    reader = apart.apart(import_module("endless").read, Extra.FORMATS, "numpy")
+    monkeypatch.setattr(isolated, "_SECONDS", 2.0)
+    reader = isolated.isolated(import_module("endless").read, Extra.FORMATS, "numpy")
     monkeypatch.setitem(files.READERS, ".vtk", reader)
     (tmp_path / "a.vtk").write_bytes(b"# vtk DataFile Version 3.0")
     with pytest.raises(MeshError, match=r"a\.vtk: numpy did not finish .* 2 seconds.*export"):

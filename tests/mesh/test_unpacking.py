@@ -103,18 +103,18 @@ LARGE, ROOM = 2**30, 2**28
 def little_room(monkeypatch):
     """Let the process that reads through a library reserve little more than it has."""
     code = (
-        "import sys; from cembench.core import loading; from cembench.mesh.formats import apart\n"
-        f"apart.free_memory = lambda: {ROOM}\n"
-        "sys.exit(apart._main(*sys.argv[4:]))"
+        "import sys; from cembench.mesh.formats import isolated\n"
+        f"isolated.free_memory = lambda: {ROOM}\n"
+        "sys.exit(isolated._main(*sys.argv[4:]))"
     )
-    from cembench.mesh.formats import apart
+    from cembench.mesh.formats import isolated
 
-    run = apart.subprocess.run
+    run = isolated.subprocess.run
 
     def little(words, **options):
         return run([words[0], "-c", code, *words], **options)
 
-    monkeypatch.setattr(apart.subprocess, "run", little)
+    monkeypatch.setattr(isolated.subprocess, "run", little)
 
 
 def vtk_block(size):

@@ -237,7 +237,7 @@ def test_the_same_surface_has_the_same_map_to_rounding_in_every_process():
     assert judged([("a", turned(1e-6))], {"a": turned(1e-6 + 1e-12)}).repeated is True
     result = judged([("a", turned(1e-6))], {"a": turned(0.1)})
     assert (result.repeated, result.kept) == (False, ())
-    assert result.apart == pytest.approx(0.1, rel=1e-2)
+    assert result.difference == pytest.approx(0.1, rel=1e-2)
     assert not result.differs  # a turn explains it
     assert judged([("a", turned(1e-6))], {"a": turned(1e-6) + 3e-7 * FLAT**2}).differs
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, complex_of, damaged
@@ -116,7 +117,7 @@ def soup_of_uv(arrays: Mapping[str, NDArray[Any]], names: Iterable[str], counted
     )
 
 
-def _complex(uv: NDArray[Any]) -> NDArray[np.complex128]:
+def _complex(uv: NDArray[Any]) -> Complex:
     """Return UVs (k, 2) or complex (k,) as complex numbers."""
     if uv.dtype.kind == "c":
         return np.ascontiguousarray(uv.ravel(), dtype=np.complex128)

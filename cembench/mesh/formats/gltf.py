@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Real
 from cembench.core.notices import Notice, NoticeKind
 from cembench.mesh.soup import Soup, Texture, columns, complex_of, in_single_precision, reading_as
 
@@ -85,7 +86,7 @@ def _scene(path: Path) -> Any:
     return trimesh.load_scene(io.BytesIO(text), file_type=kind, resolver=resolver, process=False)
 
 
-def _uv_of(mesh: Any) -> NDArray[np.float64]:
+def _uv_of(mesh: Any) -> Real:
     """Return the first texture coordinates of a mesh (n, 2); NaN if it has none."""
     uv = getattr(mesh.visual, "uv", None)
     return np.full((len(mesh.vertices), 2), np.nan) if uv is None else np.asarray(uv, np.float64)

@@ -20,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices, Real
 from cembench.core.errors import MeshError
 from cembench.mesh.soup import (
     Soup,
@@ -30,7 +31,9 @@ from cembench.mesh.soup import (
     in_single_precision,
     no_faces,
     numbers_of,
+    refuse_underscores,
     shown,
+    to_number,
     unreadable,
 )
 
@@ -261,16 +264,18 @@ def _repeated(names: list[str]) -> list[str]:
     return [name for name, count in Counter(names).items() if count > 1]
 
 
-def _numbers(body: Bytes, header_lines: int) -> NDArray[np.float64]:
+def _numbers(body: Bytes, header_lines: int) -> Real:
     """Return the numbers of a text in order."""
     numbers = numbers_of(body.tobytes())
     if numbers is not None:
         return numbers
     for number, line in enumerate(body.tobytes().decode("latin-1").splitlines(), header_lines + 1):
-        for word in line.split():
-            if not _is_number(word):
-                error = ValueError(f"{shown(word)} is not a number")
-                raise unreadable(f"line {number}", line, error)
+        try:
+            for word in line.split():
+                to_number(float, word)
+            refuse_underscores(line.split())
+        except ValueError as error:
+            raise unreadable(f"line {number}", line, error) from None
     raise damaged("the body holds a word that is not a number")
 
 
@@ -297,15 +302,6 @@ def _check_lines(elements: list[_Element], body: Bytes) -> None:
                 f"{element.name!r} {wrong[0]} (counted from 0) has {own[wrong[0]]} numbers on its "
                 f"line; the header declares {len(element.properties)}"
             )
-
-
-def _is_number(word: str) -> bool:
-    """Whether a word is a number in ASCII files."""
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return "_" not in word
 
 
 def _as_doubles(element: _Element) -> _Element:
@@ -347,7 +343,7 @@ def _counts(elements: list[_Element]) -> str:
 class _Column:
     """A property in all rows: the number of items of each row, and the items concatenated."""
 
-    sizes: NDArray[np.int64]
+    sizes: Indices
     items: NDArray[Any]
 
 
@@ -443,7 +439,7 @@ def _ends_within(element: _Element, row: int) -> MeshError:
     )
 
 
-def _whole(indices: NDArray[Any]) -> NDArray[np.int64]:
+def _whole(indices: NDArray[Any]) -> Indices:
     """Return indices as integers; whole numbers in floating point are accepted."""
     if indices.dtype.kind != "f":
         return indices.astype(np.int64)

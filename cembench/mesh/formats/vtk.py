@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from cembench.core.arrays import Indices
 from cembench.core.errors import MeshError
 from cembench.core.extras import Extra, command
 from cembench.core.notices import Notice, NoticeKind
@@ -158,7 +159,7 @@ def _faces(corners: list[int], kind: int) -> list[list[int]]:
     return [[b, a, c] if k % 2 else [a, b, c] for k, (a, b, c) in enumerate(threes)]
 
 
-def _structured(dimensions: Sequence[int]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _structured(dimensions: Sequence[int]) -> tuple[Indices, Indices]:
     """Return corners and sizes of the quadrilaterals of a structured grid, which must be flat."""
     sides = [side for side in dimensions if side > 1]
     if len(sides) != 2:

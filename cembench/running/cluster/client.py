@@ -40,9 +40,9 @@ from cembench.running.recorder import Recorder, now, record_of, recording
 from cembench.running.watcher import Step, Watcher
 
 #: Number of lost workers after which a unit is recorded as failed.
-MOST_LOST = 2
+MAX_LOST = 2
 #: Seconds between two looks at the connected workers.
-LOOK_EVERY = 1.0
+POLL_SECONDS = 1.0
 #: Seconds for the records of a unit to arrive.
 ARRIVES_WITHIN = 600.0
 #: Seconds without any worker after which a run on this machine's own workers ends: dask restarts
@@ -160,9 +160,9 @@ class _ClusterRun:
                 if self.waiting and not worker.job and not refused:
                     self._send(worker, self.waiting.pop())
             with suppress(Empty):
-                event = self.events.get(timeout=LOOK_EVERY)
+                event = self.events.get(timeout=POLL_SECONDS)
                 self._report(event) if isinstance(event, Mapping) else self._end(*event)
-            if monotonic() - self.looked > LOOK_EVERY:
+            if monotonic() - self.looked > POLL_SECONDS:
                 self._look()
         self._save_state()
 
@@ -227,19 +227,16 @@ class _ClusterRun:
         if job is None or future is not job.future:
             return
         error = future.exception() if future.status == "error" else None
-        if isinstance(error, KilledWorker):
-            self._give_up(worker, job, error.allowed_failures + 1)
-        elif error is not None:
+        if error is not None and not isinstance(error, KilledWorker):
             name = job.unit.mesh.name
             raise ClusterError(f"{name} cannot be measured on {worker.machine}: {error}") from error
+        try:
+            answer = future.result(timeout=ARRIVES_WITHIN)
+        except (OSError, TimeoutError, CancelledError, KilledWorker):  # its worker has just ended
+            self._look()
+            self._lose(worker)
         else:
-            try:
-                answer = future.result(timeout=ARRIVES_WITHIN)
-            except (OSError, TimeoutError, CancelledError):  # its worker has just ended
-                self._look()
-                self._lose(worker)
-            else:
-                self._save(worker, job, answer)
+            self._save(worker, job, answer)
 
     def _save(self, worker: _Worker, job: _Job, answer: Answer) -> None:
         missing = dict(job.tasks)
@@ -269,8 +266,8 @@ class _ClusterRun:
         with suppress(Exception):
             self.client.cancel([job.future], force=True)
         job.lost += 1
-        if job.lost >= MOST_LOST:
-            self._give_up(worker, job, job.lost)
+        if job.lost >= MAX_LOST:
+            self._give_up(worker, job)
             return
         worker.job = None
         self.waiting.append(job)
@@ -279,10 +276,10 @@ class _ClusterRun:
             f"{worker.machine} was lost{job.during}"
         )
 
-    def _give_up(self, worker: _Worker, job: _Job, lost: int) -> None:
+    def _give_up(self, worker: _Worker, job: _Job) -> None:
         """Record the cells of a unit that ended its workers as failed."""
         detail = (
-            f"its surface ended {lost} workers that measured it, the last on "
+            f"its surface ended {job.lost} workers that measured it, the last on "
             f"{worker.machine}{job.during}"
         )
         outcome = not_ok("failed", Fault(kind=FaultKind.WORKERS_LOST, detail=detail))

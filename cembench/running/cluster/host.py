@@ -18,7 +18,7 @@ from cembench.running.environment import machine_name
 #: Days after which unused files are deleted from a machine.
 KEPT_DAYS = 14.0
 #: Seconds between two attempts to take the lock of a machine.
-LOOK_EVERY = 1.0
+POLL_SECONDS = 1.0
 
 
 @contextmanager
@@ -34,7 +34,7 @@ def machine_lock(waiting: Callable[[], None]) -> Iterator[None]:
         lock = FileLock(path)
         while not lock.is_locked:
             try:
-                lock.acquire(timeout=LOOK_EVERY)
+                lock.acquire(timeout=POLL_SECONDS)
             except Timeout:
                 waiting()
     except OSError as error:

@@ -18,11 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import dask
-import numpy as np
 import psutil
 from distributed import get_worker
-from numpy.typing import NDArray
 
+from cembench.core.arrays import Complex
 from cembench.core.atomic import write_bytes
 from cembench.core.errors import CembenchError, ClusterError
 from cembench.core.loading import is_there, read_bytes
@@ -43,7 +42,7 @@ from cembench.running.watcher import Step, Watcher
 class Answer:
     """The records of a unit: their files, each with its map, and the environments by id."""
 
-    records: Sequence[tuple[bytes, NDArray[np.complex128] | None]]
+    records: Sequence[tuple[bytes, Complex | None]]
     environments: Mapping[str, dict[str, Any]]
 
 

@@ -6,7 +6,6 @@ import stat
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cembench.conformal.planar import fitted_circle, polygon_area
 from cembench.core.arrays import Complex
@@ -133,7 +132,7 @@ def of_vertices(corners: Complex, mesh: TriangleMesh) -> Complex:
     return uv
 
 
-def _in_unit_circle(uv: NDArray[np.complex128], mesh: TriangleMesh) -> NDArray[np.complex128]:
+def _in_unit_circle(uv: Complex, mesh: TriangleMesh) -> Complex:
     """Return an image shifted and scaled to fit its outer boundary to the unit circle."""
     if not (mesh.loops and np.isfinite(uv).all()):
         return uv

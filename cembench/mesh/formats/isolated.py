@@ -38,7 +38,7 @@ _NO_MEMORY = 12
 _SECONDS, _SECONDS_PER_MB = 120.0, 10.0
 
 
-def apart(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
+def isolated(reader: Reader, extra: Extra, module: str, other: str = "") -> Reader:
     """Return a reader that calls this one in another process; its library is of an extra.
 
     With `uv=True` it reads texture coordinates, too; other options are the reader's.
