@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from cembench.running.surfaces import SurfaceInput
 
 #: Rounds of a comparison: enough for a verdict on one of many surfaces.
-USUAL_ROUNDS = 12
+USUAL_ROUNDS = 10
+#: The usual surfaces, and their number of triangles: a job of a workflow takes about a minute.
+USUAL_SURFACES = ("cone", "hemi-ellipsoid", "cylinder-sheet")
+USUAL_FACES = 5000
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,7 @@ def compare_versions(
         Python files or ``module:name`` that declare the solvers; for commits, files of the
         repository.
     surfaces : iterable of meshes, paths, names or pairs of arrays
-        The surfaces (default: the set quick).
+        The surfaces (default: cone, hemi-ellipsoid and cylinder-sheet, of 5000 triangles).
     sets : sequence of str
         Many surfaces: quick, standard, paper (the profiles), real-disks, corpus, a folder, ...
     limit : int, optional
@@ -145,7 +148,7 @@ def compare_versions(
     faces : int, optional
         Number of triangles of generated surfaces.
     rounds : int
-        Number of rounds. Fewer than 12 may not decide between many surfaces.
+        Number of rounds. Fewer than 10 may not decide between many surfaces.
     seed : int
         Seed of the random order within a round.
     timeout : float
@@ -189,7 +192,9 @@ def compare_versions(
 
     if not algorithms:
         raise ParameterError("name the solvers to compare: algorithms='cem'.")
-    sets = sets or (() if surfaces else ("quick",))
+    surfaces = tuple(surfaces)
+    if not (surfaces or sets):
+        surfaces, faces = USUAL_SURFACES, faces or USUAL_FACES
     profile: Any = next((one for one in sets if one in list(Profile)), None)
     with tempfile.TemporaryDirectory(prefix="cembench-") as place, ExitStack() as stack:
         with reporter.busy("preparing both versions"):

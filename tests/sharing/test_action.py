@@ -119,3 +119,6 @@ def test_the_example_workflow_uses_inputs_that_there_are():
     steps = yaml.safe_load(WORKFLOW.read_text())["jobs"]["solver"]["steps"]
     (ours,) = [step for step in steps if "cembench" in step.get("uses", "")]
     assert ours["with"].keys() <= inputs.keys()
+    assert {"base", "solver"} <= ours["with"].keys(), "it compares the solver with its base"
+    (clone,) = [step for step in steps if "checkout" in step.get("uses", "")]
+    assert clone["with"]["fetch-depth"] == 0, "the commit of the base is there"
