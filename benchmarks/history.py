@@ -1,0 +1,119 @@
+"""How fast algorithms and shared steps were at commits of this project's past, kept by asv."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Mapping, Sequence
+from itertools import pairwise, product
+from math import exp, isnan, log, nan
+from typing import Any
+
+import matplotlib as mpl
+
+from benchmarks.measuring import png
+from benchmarks.pages import ROOT, Section, Table
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+
+KEPT = ROOT / "benchmarks/kept_history"
+#: A smaller change from one commit to the next is not called a step.
+STEP = 1.2
+STEPS = """
+| what | commit | before | after | times |
+|---|---|---:|---:|---:|
+| {what} | `{commit}` | {before:.3g} ms | {after:.3g} ms | {times:.2f} |"""
+#: Milliseconds of algorithms or steps by commit; of algorithms the geometric mean over surfaces.
+Series = Mapping[str, list[float]]
+
+
+def history(*, machine: str = "reference") -> Section:
+    """Draw the seconds of algorithms and shared steps over commits of this project's past.
+
+    The figures are those that asv keeps in `benchmarks/kept_history`, on one machine; its file
+    `steps.toml` explains steps. ``make history`` measures the commits that have no figures.
+    """
+    listed = (KEPT / "commits.txt").read_text(encoding="utf-8").split()
+    found = {one: run for one in listed if (run := results(machine, one))}
+    if not found:
+        return Section(["No commit has figures yet; `make history` measures them."])
+    runs = list(found.values())
+    maps, steps = series(runs, "history.Maps.time_map"), series(runs, "history.Steps.time_step")
+    times = {name: first(values) / values[-1] for name, values in maps.items()}
+    fastest = ", ".join(f"{name} {times[name]:.1f}" for name in sorted(times, key=times.get))
+    head = (
+        f"Over {len(found)} commits from the first one on, algorithms became this many times "
+        f"faster since they were there: {fastest}."
+    )
+    picture = "![Milliseconds of algorithms and of shared steps by commit](history.png)"
+    table = Table(changes(maps | steps, list(found)), STEPS)
+    known = tomllib.loads((KEPT / "steps.toml").read_text(encoding="utf-8"))
+    why = [f"**{title}.** {text.strip()}" for title, text in known.items()]
+    missing = ", ".join(f"`{one[:8]}`" for one in listed if one not in found)
+    left_out = [f"Not measured, because they could not be built: {missing}."] if missing else []
+    drawing = {"history.png": png(drawn(maps | steps), dpi=110)}
+    return Section([head, picture, table, *why, *left_out], files=drawing)
+
+
+def results(machine: str, commit: str) -> dict[str, Any] | None:
+    """Return asv's results of a commit, if there are any."""
+    for path in (KEPT / machine).glob(f"{commit[:8]}-*.json"):
+        run: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        if any(series([run], "history.Maps.time_map").values()):
+            return run
+    return None
+
+
+def first(values: Sequence[float]) -> float:
+    """Return the first value that is there."""
+    return next(value for value in values if not isnan(value))
+
+
+def series(runs: Sequence[Mapping[str, Any]], benchmark: str) -> Series:
+    """Return milliseconds by commit; nan where a commit has none."""
+    values: dict[str, list[float]] = {}
+    for run in runs:
+        row = dict(zip(run["result_columns"], run["results"].get(benchmark, ()), strict=False))
+        logs: dict[str, list[float]] = {}
+        places = product(*row.get("params", ()))
+        for place, seconds in zip(places, row.get("result") or (), strict=False):
+            logs.setdefault(place[0].strip("'"), []).append(log(1e3 * seconds) if seconds else nan)
+        for name, each in logs.items():
+            values.setdefault(name, []).append(exp(sum(each) / len(each)))
+    return {name: each for name, each in values.items() if not all(map(isnan, each))}
+
+
+def changes(found: Series, commits: Sequence[str]) -> list[dict[str, Any]]:
+    """Return the steps, in the order of history."""
+    rows = [
+        (number, {"what": name, "commit": commit[:8], "before": old, "after": new})
+        for name, values in found.items()
+        for number, (commit, (old, new)) in enumerate(
+            zip(commits[1:], pairwise(values), strict=True)
+        )
+        if abs(log(new / old)) > log(STEP)
+    ]
+    return [row | {"times": row["after"] / row["before"]} for _, row in sorted(rows, key=_number)]
+
+
+def _number(row: tuple[int, Any]) -> int:
+    return row[0]
+
+
+def drawn(found: Series) -> Any:
+    """Draw a panel for each series over the commits, in the order of history."""
+    rows = -(-len(found) // 3)
+    figure, axes = plt.subplots(rows, 3, figsize=(11, 2.2 * rows), sharex=True, squeeze=False)
+    for axis, (name, values) in zip(axes.flat, found.items(), strict=False):
+        axis.plot(values, ".-", color="tab:blue")
+        axis.set(title=name, ylim=(0, None))
+        axis.grid(alpha=0.3)
+    for axis in axes.flat[len(found) :]:
+        axis.axis("off")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("ms")
+    for axis in axes[-1]:
+        axis.set_xlabel("commit, first to last")
+    figure.tight_layout()
+    return figure
