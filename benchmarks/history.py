@@ -18,13 +18,13 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 
 KEPT = ROOT / "benchmarks/kept_history"
-#: A smaller change from one commit to the next is not called a step.
-STEP = 1.2
+#: Smaller changes from one commit to the next are no steps: of seconds, and of mean angle errors.
+STEP, WORSE = 1.2, 1.01
 STEPS = """
 | what | commit | before | after | times |
 |---|---|---:|---:|---:|
-| {what} | `{commit}` | {before:.3g} ms | {after:.3g} ms | {times:.2f} |"""
-#: Milliseconds of algorithms or steps by commit; of algorithms the geometric mean over surfaces.
+| {what} | `{commit}` | {before:.3g} {unit} | {after:.3g} {unit} | {times:.2f} |"""
+#: Figures of algorithms or steps by commit; of seconds the geometric mean over surfaces.
 Series = Mapping[str, list[float]]
 
 
@@ -40,6 +40,7 @@ def history(*, machine: str = "reference") -> Section:
         return Section(["No commit has figures yet; `make history` measures them."])
     runs = list(found.values())
     maps, steps = series(runs, "history.Maps.time_map"), series(runs, "history.Steps.time_step")
+    angles = series(runs, "history.Quality.track_angle_error", 1.0)
     times = {name: first(values) / values[-1] for name, values in maps.items()}
     fastest = ", ".join(f"{name} {times[name]:.1f}" for name in sorted(times, key=times.get))
     head = (
@@ -47,7 +48,10 @@ def history(*, machine: str = "reference") -> Section:
         f"faster since they were there: {fastest}."
     )
     picture = "![Milliseconds of algorithms and of shared steps by commit](history.png)"
-    table = Table(changes(maps | steps, list(found)), STEPS)
+    rows = changes(maps | steps, list(found), STEP, "ms")
+    errors = {f"{name}, mean angle error": values for name, values in angles.items()}
+    rows += changes(errors, list(found), WORSE, "degrees")
+    table = Table(sorted(rows, key=lambda row: row["number"]), STEPS)
     known = tomllib.loads((KEPT / "steps.toml").read_text(encoding="utf-8"))
     why = [f"**{title}.** {text.strip()}" for title, text in known.items()]
     missing = ", ".join(f"`{one[:8]}`" for one in listed if one not in found)
@@ -70,35 +74,31 @@ def first(values: Sequence[float]) -> float:
     return next(value for value in values if not isnan(value))
 
 
-def series(runs: Sequence[Mapping[str, Any]], benchmark: str) -> Series:
-    """Return milliseconds by commit; nan where a commit has none."""
+def series(runs: Sequence[Mapping[str, Any]], benchmark: str, scale: float = 1e3) -> Series:
+    """Return figures by commit; nan where a commit has none."""
     values: dict[str, list[float]] = {}
     for run in runs:
         row = dict(zip(run["result_columns"], run["results"].get(benchmark, ()), strict=False))
         logs: dict[str, list[float]] = {}
         places = product(*row.get("params", ()))
-        for place, seconds in zip(places, row.get("result") or (), strict=False):
-            logs.setdefault(place[0].strip("'"), []).append(log(1e3 * seconds) if seconds else nan)
+        for place, figure in zip(places, row.get("result") or (), strict=False):
+            logs.setdefault(place[0].strip("'"), []).append(log(scale * figure) if figure else nan)
         for name, each in logs.items():
             values.setdefault(name, []).append(exp(sum(each) / len(each)))
     return {name: each for name, each in values.items() if not all(map(isnan, each))}
 
 
-def changes(found: Series, commits: Sequence[str]) -> list[dict[str, Any]]:
-    """Return the steps, in the order of history."""
-    rows = [
-        (number, {"what": name, "commit": commit[:8], "before": old, "after": new})
+def changes(found: Series, commits: Sequence[str], step: float, unit: str) -> list[dict[str, Any]]:
+    """Return the steps from one commit to the next, with the number of the commit."""
+    about = {"unit": unit}
+    return [
+        {"what": name, "number": n, "commit": commits[n][:8], "before": old, "after": new}
+        | about
+        | {"times": new / old}
         for name, values in found.items()
-        for number, (commit, (old, new)) in enumerate(
-            zip(commits[1:], pairwise(values), strict=True)
-        )
-        if abs(log(new / old)) > log(STEP)
+        for n, (old, new) in enumerate(pairwise(values), 1)
+        if abs(log(new / old)) > log(step)
     ]
-    return [row | {"times": row["after"] / row["before"]} for _, row in sorted(rows, key=_number)]
-
-
-def _number(row: tuple[int, Any]) -> int:
-    return row[0]
 
 
 def drawn(found: Series) -> Any:

@@ -44,10 +44,13 @@ def test_a_map_has_the_figures_of_our_metrics_and_what_is_not_there_is_named(sui
     assert got["folds"] == expected["flipped_triangles"] == 0
     bench.setup(found, "lscm", "cone")
     bench.time_map(found, "lscm", "cone")
+    tracked = suite.Quality()
+    tracked.setup(found, "lscm")
+    assert tracked.track_angle_error(found, "lscm") == got["angle"]
     with pytest.raises(NotImplementedError, match="no algorithm later"):
         bench.setup(found, "later", "cone")
     with pytest.raises(NotImplementedError, match="no algorithm later"):
-        suite.Quality().track_folds(found, "later")
+        suite.Quality().setup(found, "later")
 
 
 def test_every_step_can_be_called(suite):
@@ -61,10 +64,12 @@ def asv_results(cem, lscm):
     """A file of asv: seconds of two algorithms on two surfaces."""
     params = [["'cem'", "'lscm'"], ["'cone'", "'cap'"]]
     maps = [[*cem, *lscm], params]
+    angles = [[1.0, lscm[0]], params[:1]]
     return {
         "result_columns": ["result", "params"],
         "results": {
             "history.Maps.time_map": maps,
+            "history.Quality.track_angle_error": angles,
             "history.Steps.time_step": [[0.001], [["'solve'"]]],
         },
     }
@@ -80,7 +85,7 @@ def kept(tmp_path, monkeypatch):
     none = (None, None)
     for commit, figures in zip(
         COMMITS,
-        [((0.1, 0.4), none), ((0.025, 0.1), none), ((0.025, 0.1), (1, 1)), (none, none)],
+        [((0.1, 0.4), none), ((0.025, 0.1), (2, 1)), ((0.025, 0.1), (1, 2)), (none, none)],
         strict=True,
     ):
         path = tmp_path / f"reference/{commit[:8]}-virtualenv.json"
@@ -94,6 +99,7 @@ def test_the_page_has_a_sentence_the_steps_and_their_reasons(kept):
     assert "Over 3 commits" in text
     assert "lscm 1.0, cem 4.0" in text
     assert "| cem | `bbbbbbbb` | 200 ms | 50 ms | 0.25 |" in text
+    assert "| lscm, mean angle error | `cccccccc` | 2 degrees | 1 degrees | 0.50 |" in text
     assert "**CEM, `bbbbbbbb`.** It solves for less." in text
     assert "could not be built: `dddddddd`" in text
     assert found.files["history.png"].startswith(b"\x89PNG")
@@ -107,5 +113,6 @@ def test_without_figures_the_page_says_how_they_are_made(kept):
 
 def test_only_a_change_that_is_large_is_a_step():
     nan = float("nan")
-    found = changes({"cem": [nan, 1.0, 1.1, 2.0], "ldm": [3.0, 1.0, 1.0, 1.0]}, COMMITS)
-    assert [(row["what"], row["commit"][0]) for row in found] == [("ldm", "b"), ("cem", "d")]
+    found = {"cem": [nan, 1.0, 1.1, 2.0], "ldm": [3.0, 1.0, 1.0, 1.0]}
+    rows = sorted(changes(found, COMMITS, 1.2, "ms"), key=lambda row: row["number"])
+    assert [(row["what"], row["commit"][0]) for row in rows] == [("ldm", "b"), ("cem", "d")]
