@@ -241,7 +241,10 @@ def _compared(run: Run, algorithms: Sequence[str], versions: Sequence[Version]) 
             {r.cell.mesh_hash: r for r in run.asked if r.cell.algorithm == f"{name}@{one.name}"}
             for one in (old, new)
         )
-        pairs = [(later[key], earlier[key]) for key in earlier]
+        pairs = [(later[key], earlier[key]) for key in earlier if key in later]
+        for lost in (row(earlier[key]) for key in earlier if key not in later):
+            why = {"status": "skipped", "cause": "the later version does not take such a surface"}
+            cells.append((lost | {"algorithm": name}, lost | {"algorithm": name} | why))
         for records in pairs:
             after, before = (row(record) | {"algorithm": name} for record in records)
             cells.append((before, after))
