@@ -96,12 +96,12 @@ def kept(tmp_path, monkeypatch):
 def test_the_page_has_a_sentence_the_steps_and_their_reasons(kept):
     found = history()
     text = str(found)
-    assert "Over 3 commits" in text
+    assert "the first of 3 commits that has it" in text
     assert "lscm 1.0, cem 4.0" in text
     assert "| cem | `bbbbbbbb` | 200 ms | 50 ms | 0.25 |" in text
     assert "| lscm, mean angle error | `cccccccc` | 2 degrees | 1 degrees | 0.50 |" in text
     assert "**CEM, `bbbbbbbb`.** It solves for less." in text
-    assert "could not be built: `dddddddd`" in text
+    assert "impossible to build: `dddddddd`" in text
     assert found.files["history.png"].startswith(b"\x89PNG")
 
 
