@@ -78,16 +78,14 @@ def regressions(
     ParameterError
         A kind is unknown.
     RecordError
-        There was no valid map before; or nothing is known to be worse, and "slower" cannot be
-        decided, since too few rounds timed both.
+        There was no valid map before; or "slower" cannot be decided by the rounds there are.
 
     """
     check_kinds(kinds := list(kinds))
     pairs = list(pairs)
     if kinds and not any(before["status"] in VALID for before, _ in pairs):
         raise RecordError(
-            "the earlier one has no valid map, so nothing can be said of the later one; "
-            "`cembench status RUN` shows why. Compare with one that has maps."
+            "the earlier one has no valid map to compare with; `cembench status RUN` shows why."
         )
     found = [
         Regression("slower", change.after["algorithm"], change.after["mesh"], f"{one.ratio:.2f}x")
@@ -98,14 +96,13 @@ def regressions(
         place = after["algorithm"], after["mesh"]
         if VALID.get(after["status"], 0) < VALID.get(before["status"], 0):
             why = ": ".join(filter(None, (after["status"], after.get("cause"))))
-            only = after["status"] in VALID and "invalid" not in kinds
-            found.append(Regression("slower" if only else "invalid", *place, why))
+            seconds = after["status"] in VALID and "invalid" not in kinds
+            found.append(Regression("slower" if seconds else "invalid", *place, why))
         found += [Regression("worse", *place, why) for why in _worse(before, after)]
     found = [one for one in found if one.kind in kinds]
     if "slower" in kinds and not found and not any(c.comparison.interval for c in changes):
         raise RecordError(
-            "whether it is slower is unknown: no surface has enough rounds in which both were "
-            "timed. Ask for more, such as --rounds 12; `cembench status RUN` shows what was timed."
+            "whether it is slower is unknown: too few rounds timed both. Ask for --rounds 12."
         )
     return found
 
