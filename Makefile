@@ -10,7 +10,7 @@ READY  := $(VENV)/ready
 # Holds what `make reproduce` needs; an environment that is ready holds it too.
 LIGHT  := $(VENV)/ready-to-reproduce
 
-.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels fuzz stale refresh release-check test-matrix pins clean
+.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels history fuzz stale refresh release-check test-matrix pins clean
 
 reproduce: $(LIGHT)
 	$(BIN)/cembench reproduce
@@ -36,6 +36,10 @@ docs: $(READY)
 
 bench: $(READY)
 	$(BIN)/python -m benchmarks limit 276000 1690000
+
+# Measures what the kept history lacks, about 45 s a commit, and writes its page. HISTORY="--meshes ../shared/meshes" and the like.
+history: $(READY)
+	$(BIN)/python -m benchmarks.kept_history.measure $(HISTORY)
 
 bench-kernels: $(READY)
 	$(BIN)/python -m pytest tests/benchmarks/test_kernels.py --benchmark-enable --benchmark-autosave
@@ -84,4 +88,4 @@ $(LIGHT): pyproject.toml
 	@touch $@
 
 clean:
-	rm -rf $(VENV) docs/_build docs/api docs/gallery docs/cli.md build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis
+	rm -rf $(VENV) docs/_build docs/api docs/gallery docs/cli.md docs/history.* build dist *.egg-info .mypy_cache .ruff_cache .pytest_cache .hypothesis

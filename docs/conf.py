@@ -15,6 +15,7 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"):
 
 import cli_pages  # noqa: E402 - after the path
 import gallery_pictures  # noqa: E402
+import history_page  # noqa: E402
 import paper_pages  # noqa: E402
 
 project = "cembench"
@@ -118,8 +119,9 @@ def _skip_aliases(app, what, name, object_, skip, options):
 
 
 def setup(app):
-    """Write the pages of commands and papers before anything is read."""
+    """Write the pages of commands, papers and the history before anything is read."""
     cli_pages.write_page(HERE / "cli.md")
+    history_page.write_page(HERE / "history.md")
     paper_pages.write_pages(HERE / "_pages/papers")
     app.connect("source-read", _link_to_files)
     app.connect("autodoc-process-docstring", _keep_bars)

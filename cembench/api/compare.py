@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     from cembench.running.surfaces import SurfaceInput
 
 #: Rounds of a comparison: enough for a verdict on one of many surfaces.
-USUAL_ROUNDS = 12
+USUAL_ROUNDS = 10
+#: The usual surfaces, and their number of triangles: a job of a workflow takes about a minute.
+USUAL_SURFACES = ("cone", "hemi-ellipsoid", "cylinder-sheet")
+USUAL_FACES = 5000
 
 
 @dataclass(frozen=True)
@@ -137,7 +140,7 @@ def compare_versions(
         Python files or ``module:name`` that declare the solvers; for commits, files of the
         repository.
     surfaces : iterable of meshes, paths, names or pairs of arrays
-        The surfaces (default: the set quick).
+        The surfaces (default: cone, hemi-ellipsoid and cylinder-sheet, of 5000 triangles).
     sets : sequence of str
         Many surfaces: quick, standard, paper (the profiles), real-disks, corpus, a folder, ...
     limit : int, optional
@@ -145,7 +148,7 @@ def compare_versions(
     faces : int, optional
         Number of triangles of generated surfaces.
     rounds : int
-        Number of rounds. Fewer than 12 may not decide between many surfaces.
+        Number of rounds. Fewer than 10 may not decide between many surfaces.
     seed : int
         Seed of the random order within a round.
     timeout : float
@@ -189,7 +192,9 @@ def compare_versions(
 
     if not algorithms:
         raise ParameterError("name the solvers to compare: algorithms='cem'.")
-    sets = sets or (() if surfaces else ("quick",))
+    surfaces = tuple(surfaces)
+    if not (surfaces or sets):
+        surfaces, faces = USUAL_SURFACES, faces or USUAL_FACES
     profile: Any = next((one for one in sets if one in list(Profile)), None)
     with tempfile.TemporaryDirectory(prefix="cembench-") as place, ExitStack() as stack:
         with reporter.busy("preparing both versions"):
@@ -236,7 +241,10 @@ def _compared(run: Run, algorithms: Sequence[str], versions: Sequence[Version]) 
             {r.cell.mesh_hash: r for r in run.asked if r.cell.algorithm == f"{name}@{one.name}"}
             for one in (old, new)
         )
-        pairs = [(later[key], earlier[key]) for key in earlier]
+        pairs = [(later[key], earlier[key]) for key in earlier if key in later]
+        for lost in (row(earlier[key]) for key in earlier if key not in later):
+            why = {"status": "skipped", "cause": "the later version does not take such a surface"}
+            cells.append((lost | {"algorithm": name}, lost | {"algorithm": name} | why))
         for records in pairs:
             after, before = (row(record) | {"algorithm": name} for record in records)
             cells.append((before, after))

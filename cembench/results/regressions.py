@@ -12,8 +12,8 @@ from cembench.results.columns import is_free
 from cembench.results.multiple_testing import corrected
 from cembench.results.runs_compared import Change, Row
 
-#: Statuses of a valid map, the second one with seconds that are not comparable.
-VALID = "ok", "not_comparable"
+#: Statuses of a valid map; with the lower one its seconds cannot be compared.
+VALID = {"ok": 2, "not_comparable": 1}
 #: Ratios this close to 1 are ties.
 TIE = 0.01
 #: Energies below this share of the image's area are rounding, and count as equal.
@@ -23,6 +23,7 @@ NO_ANGLE = 0.01
 
 #: "slower": the verdict, corrected for all comparisons. "worse": a larger energy or mean angle
 #: error, by more than :data:`TIE`, or more folds. "invalid": no valid map where there was one.
+#: Where seconds cannot be compared any more, "invalid" stands for that too; without it, "slower".
 FailOn = Literal["slower", "worse", "invalid"]
 
 
@@ -54,7 +55,7 @@ def figures_of(row: Row, other: Row) -> dict[str, float]:
     The energy is that in the common gauge if both rows have it, else over the image's area where
     the image has no size of its own.
     """
-    if row["status"] != "ok":
+    if row["status"] not in VALID:
         return {}
     energy, angle, folds = (
         row.get(name) for name in ("conformal_energy", "angle_error_mean_deg", "flipped_triangles")
@@ -77,15 +78,14 @@ def regressions(
     ParameterError
         A kind is unknown.
     RecordError
-        There was no valid map before, so nothing can have become worse.
+        There was no valid map before; or "slower" cannot be decided by the rounds there are.
 
     """
     check_kinds(kinds := list(kinds))
     pairs = list(pairs)
-    if kinds and all(before["status"] != "ok" for before, _ in pairs):
+    if kinds and not any(before["status"] in VALID for before, _ in pairs):
         raise RecordError(
-            "the earlier one has no valid map, so nothing can be said of the later one; "
-            "`cembench status RUN` shows why. Compare with one that has maps."
+            "the earlier one has no valid map to compare with; `cembench status RUN` shows why."
         )
     found = [
         Regression("slower", change.after["algorithm"], change.after["mesh"], f"{one.ratio:.2f}x")
@@ -94,11 +94,17 @@ def regressions(
     ]
     for before, after in pairs:
         place = after["algorithm"], after["mesh"]
-        if before["status"] == "ok" and after["status"] not in VALID:
+        if VALID.get(after["status"], 0) < VALID.get(before["status"], 0):
             why = ": ".join(filter(None, (after["status"], after.get("cause"))))
-            found.append(Regression("invalid", *place, why))
+            seconds = after["status"] in VALID and "invalid" not in kinds
+            found.append(Regression("slower" if seconds else "invalid", *place, why))
         found += [Regression("worse", *place, why) for why in _worse(before, after)]
-    return [one for one in found if one.kind in kinds]
+    found = [one for one in found if one.kind in kinds]
+    if "slower" in kinds and not found and not any(c.comparison.interval for c in changes):
+        raise RecordError(
+            "whether it is slower is unknown: too few rounds timed both. Ask for --rounds 12."
+        )
+    return found
 
 
 def _worse(before: Row, after: Row) -> Iterable[str]:

@@ -73,6 +73,30 @@ def test_a_worse_version_and_one_that_fails_are_found(files):
     assert not any("behind" in str(note) for r in found.run.records() for note in r.outcome.notes)
 
 
+def test_a_surface_that_the_later_version_does_not_take_does_not_pass(tmp_path):
+    text = """
+from cembench import {kind}, Parameterization, algorithm
+
+
+@algorithm("flat", title="Flat", target="free boundary")
+def flat(mesh: {kind}) -> Parameterization:
+    "Leave the plane as it is."
+    return Parameterization(mesh.V[:, 0] + 1j * mesh.V[:, 1])
+"""
+    files = []
+    for folder, kind in (("old", "TriangleMesh"), ("new", "DiskMesh")):
+        (tmp_path / folder).mkdir()
+        files.append(str(tmp_path / folder / "flat.py"))
+        (tmp_path / folder / "flat.py").write_text(text.format(kind=kind))
+    found = cembench.compare_versions(
+        *files, algorithms=["flat"], surfaces=["holed-disk"], faces=500, rounds=1
+    )
+    (lost,) = found.regressions(["invalid"])
+    assert str(lost) == (
+        "invalid: flat on holed-disk: skipped: the later version does not take such a surface"
+    )
+
+
 @pytest.mark.slow
 def test_a_slower_version_is_found_and_the_same_one_twice_is_not(files):
     found = cembench.compare_versions(

@@ -16,7 +16,10 @@ def cell(**more):
     return about | figures | more
 
 
-def found(before, after, kinds=EVERY, changes=()):
+UNDECIDED = Change(cell(), cell(), Comparison(1, (0.5, 2), "undecided", 7, 0.9))
+
+
+def found(before, after, kinds=EVERY, changes=(UNDECIDED,)):
     return [(one.kind, one.detail) for one in regressions([(before, after)], changes, kinds)]
 
 
@@ -52,11 +55,33 @@ def test_a_map_that_is_no_longer_valid_is_invalid_and_nothing_else():
     assert found(cell(), failed, ("slower", "worse")) == []
 
 
+def test_seconds_that_can_no_longer_be_compared_do_not_pass():
+    hidden = cell(status="not_comparable", cause="it used 2 cores", angle_error_mean_deg=3.0)
+    said = "not_comparable: it used 2 cores"
+    worse = ("worse", "mean angle error 2 -> 3")
+    assert found(cell(), hidden) == [("invalid", said), worse]
+    assert found(cell(), hidden, ["invalid"]) == [("invalid", said)]
+    assert found(cell(), hidden, ["slower"]) == [("slower", said)]
+    assert found(cell(), hidden, ["worse"]) == [worse]
+    assert found(hidden, cell(status="failed"), ["invalid"]) == [("invalid", "failed")]
+    assert found(hidden, hidden, ["worse", "invalid"]) == []
+
+
+@pytest.mark.parametrize(
+    "changes", [[], [Change(cell(), cell(), Comparison(1.5, None, "too few rounds", 2))]]
+)
+def test_slower_is_not_denied_where_it_cannot_be_decided(changes):
+    with pytest.raises(RecordError, match=r"whether it is slower is unknown.*--rounds 12"):
+        found(cell(), cell(), changes=changes)
+    assert found(cell(), cell(), ["worse", "invalid"], changes) == []
+    assert found(cell(), cell(status="failed"), changes=changes) == [("invalid", "failed")]
+
+
 def test_a_cell_is_slower_if_its_verdict_holds_among_all_of_them():
     slow = Change(cell(), cell(), Comparison(1.5, (1.2, 2.0), "slower", 12, 0.001))
     maybe = Change(cell(), cell(mesh="cone"), Comparison(1.5, (1.2, 2.0), "slower", 7, 0.04))
     assert found(cell(), cell(), changes=[slow]) == [("slower", "1.50x")]
-    doubtful = [maybe, *[Change(cell(), cell(), Comparison(1, (0.5, 2), "undecided", 7, 0.9))] * 3]
+    doubtful = [maybe, *[UNDECIDED] * 3]
     assert found(cell(), cell(), changes=doubtful) == []
 
 

@@ -84,25 +84,41 @@ def test_a_program_is_judged_by_its_command(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_solver_is_compared_with_its_version_at_a_base(tmp_path):
+@pytest.mark.parametrize(
+    ("ends", "kind"),
+    [
+        ("return Parameterization(uv * (1.5 - 0.5 * abs(uv)))", "worse: ours on cone: E_C"),
+        (
+            "raise ValueError('not today')",
+            "invalid: ours on cone: failed: RuntimeError: ValueError",
+        ),
+        (
+            "uv[mesh.interior[0]] = 0.9; return Parameterization(uv)",
+            "invalid: ours on cone: invalid",
+        ),
+        ("return Parameterization(uv)", ""),
+    ],
+)
+def test_a_solver_is_compared_with_its_version_at_a_base(tmp_path, ends, kind):
     def git(*words):
         me = ["-c", "user.name=a", "-c", "user.email=a@b"]
         subprocess.run(["git", *me, *words], cwd=tmp_path, check=True, capture_output=True)
 
     git("init", "-q")
     text = (EXAMPLE / "solver.py").read_text()
-    wrong = text.replace("arc_length_circle(mesh))", "arc_length_circle(mesh) ** 2)")
-    for version in (text, wrong):
+    later = text.replace("return Parameterization(", "uv = (") + f"    {ends}\n"
+    for version in (text, later):
         (tmp_path / "solver.py").write_text(version)
         git("add", "solver.py")
         git("commit", "-qm", "a version")
     given = {"plugin": "solver.py", "solver": "ours", "base": "HEAD~1"}
     given["compare-arguments"] = "--surfaces cone --faces 120 --rounds 1"
+    given["fail-on"] = "worse,invalid"
     code, said, summary, checks = acted(tmp_path, "Compare", "compare-junit", **given)
-    assert code == 1, said
-    assert "error: invalid: ours on cone" in said
-    assert "invalid" in rendered(summary)
-    assert len(checks.findall(".//failure")) == 1
+    assert code == bool(kind), said
+    assert f"error: {kind}" in said or not kind
+    assert "ours" in rendered(summary)
+    assert bool(checks.findall(".//failure")) == bool(kind)
 
 
 @pytest.mark.parametrize("file", [ACTION, WORKFLOW, ROOT / "examples/results_repository"])
@@ -119,3 +135,6 @@ def test_the_example_workflow_uses_inputs_that_there_are():
     steps = yaml.safe_load(WORKFLOW.read_text())["jobs"]["solver"]["steps"]
     (ours,) = [step for step in steps if "cembench" in step.get("uses", "")]
     assert ours["with"].keys() <= inputs.keys()
+    assert {"base", "solver"} <= ours["with"].keys(), "it compares the solver with its base"
+    (clone,) = [step for step in steps if "checkout" in step.get("uses", "")]
+    assert clone["with"]["fetch-depth"] == 0, "the commit of the base is there"
