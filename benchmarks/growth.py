@@ -12,7 +12,7 @@ import numpy as np
 from benchmarks import noise
 from benchmarks.pages import Section, Table
 from cembench.results.intervals import LOOKS
-from cembench.validation.scaling import MOST_ROUNDS, GrowthAnswer, answer_of
+from cembench.validation.scaling import MAX_ROUNDS, GrowthAnswer, answer_of
 
 #: How much larger the larger mesh is.
 RATIO = 3.0
@@ -38,8 +38,8 @@ def simulate(
     model: str, runs: int, ours: float, reference: float, *, dearer: float = 1.0, seed: int = 0
 ) -> Simulated:
     """Validate a solver `runs` times; large meshes cost more by the factor `dearer`."""
-    calls = noise.MODELS[model](np.random.default_rng(seed), runs, 4 * MOST_ROUNDS)
-    calls = np.random.default_rng(seed + 1).permuted(calls.reshape(runs, MOST_ROUNDS, 4), axis=2)
+    calls = noise.MODELS[model](np.random.default_rng(seed), runs, 4 * MAX_ROUNDS)
+    calls = np.random.default_rng(seed + 1).permuted(calls.reshape(runs, MAX_ROUNDS, 4), axis=2)
     logs = np.log(calls) / log(RATIO)
     added = log(dearer) / log(RATIO)
     own = logs[..., 1] - logs[..., 0] + ours + added
@@ -47,7 +47,7 @@ def simulate(
     answers: Counter[GrowthAnswer] = Counter()
     rounds = 0
     for exponents, differences in zip(own.tolist(), above.tolist(), strict=True):
-        for n in (look for look in LOOKS if look <= MOST_ROUNDS):
+        for n in (look for look in LOOKS if look <= MAX_ROUNDS):
             answer = answer_of(exponents[:n], differences[:n])
             if answer is not GrowthAnswer.inconclusive:
                 break

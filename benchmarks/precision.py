@@ -11,7 +11,7 @@ from scipy.special import stdtr
 
 from benchmarks import noise
 from benchmarks.pages import Section, Table
-from cembench.results.intervals import ERROR, LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION, share
+from cembench.results.intervals import ERROR, LOOKS, USUAL_MAX_ROUNDS, USUAL_PRECISION, share
 from cembench.results.rank_tests import cut, walsh_averages
 
 LAYOUT = """
@@ -51,7 +51,7 @@ def looks(most: int) -> list[int]:
 
 
 def simulate(
-    model: str, runs: int, precision: float, most: int = USUAL_MOST_ROUNDS, seed: int = 0
+    model: str, runs: int, precision: float, most: int = USUAL_MAX_ROUNDS, seed: int = 0
 ) -> Simulated:
     """Measure pairs of algorithms of equal cost until they are precise, or `most` rounds."""
     seconds = np.log(noise.pairs(model, np.random.default_rng(seed), runs, most))
@@ -112,7 +112,7 @@ def precision(*, runs: int = 4000) -> Section:
     for model in noise.MODELS:
         chunks = [family_error(model, 50_000, rng) for _ in range(max(1, 40 * runs // 50_000))]
         corrected.append({"noise": model, "wrong": np.mean(chunks)})
-    note = f"{runs:,} simulated runs a line, at most {USUAL_MOST_ROUNDS} rounds; "
+    note = f"{runs:,} simulated runs a line, at most {USUAL_MAX_ROUNDS} rounds; "
     note += f"of the second table {40 * runs:,}."
     return Section(
         [Table(rows, LAYOUT), Table(corrected, CORRECTED), note], "docs/measuring_details.md"

@@ -15,7 +15,7 @@ from cembench.algorithms.cem import cem
 
 from benchmarks.measuring import png, progress
 from benchmarks.pages import Section
-from benchmarks.qiem_steps import MOST_STEPS, ruled
+from benchmarks.qiem_steps import MAX_STEPS, ruled
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
@@ -62,7 +62,7 @@ def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict
         for tolerance in sorted(TOLERANCES, reverse=True):  # the longest flow is remembered last
             tried.clear()
             with ruled(FIRST=first, GROWTH=growth):
-                rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MOST_STEPS)
+                rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MAX_STEPS)
             ends[tolerance] = len(tried) - 1
     L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
     return list(_finished(mesh, L, accepted(L_double, tried))), ends

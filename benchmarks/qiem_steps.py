@@ -38,7 +38,7 @@ VARIANTS: tuple[dict[str, float], ...] = (
     {"tolerance": 1e-8},
 )
 #: Enough for every variant; the table has the number needed.
-MOST_STEPS = 2000
+MAX_STEPS = 2000
 LAYOUT = """
 | first dt | growth | stop | steps | factorisations | over CEM's | right-hand sides over CEM's \
 | CPU seconds over CEM's | E_C over CEM's |
@@ -95,7 +95,7 @@ def row(variant: dict[str, float], meshes: list[TriangleMesh]) -> dict[str, Any]
         base, _, best, base_cpu = called("cem", mesh)
         with suppress(AlgorithmFailed), ruled(**constants):
             work, count, energy, cpu = called(
-                "qiem", mesh, tolerance=rule["tolerance"], max_iterations=MOST_STEPS
+                "qiem", mesh, tolerance=rule["tolerance"], max_iterations=MAX_STEPS
             )
             steps.append(count)
             figures.append(

@@ -62,7 +62,7 @@ _MARK = "__cembench__"
 #: Integers of this size do not fit into arrays, whatever range a parameter declares.
 LARGEST = 2**63
 #: Most triangles that a family of surfaces should offer: more fill the memory of many machines.
-MOST_FACES = 4_000_000
+MAX_FACES = 4_000_000
 C = TypeVar("C", bound=Callable[..., Any])
 
 

@@ -17,7 +17,7 @@ from pydantic import Field
 
 from cembench.core.errors import RegistryError
 from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .brain import human_brain_body
 from .bunny import stanford_bunny_body
@@ -37,7 +37,7 @@ from .statues import isis_statue_body, statue_of_liberty_body
 from .vessels import bourbon_bottle_body, chinese_vase_body
 
 #: Smallest and largest number of triangles that can be requested.
-Faces = Annotated[int, Field(ge=400, le=MOST_FACES)]
+Faces = Annotated[int, Field(ge=400, le=MAX_FACES)]
 Seed = Annotated[int, Field(ge=0)]
 
 #: The function that makes the solid of each stand-in from a seed.

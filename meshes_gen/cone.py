@@ -9,7 +9,7 @@ from pydantic import Field
 
 from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .disk_grid import disk_grid
 from .levers import with_levers
@@ -25,7 +25,7 @@ def exact_map(V: Real, angle: float = 30.0) -> Complex:
 @surface_family("cone", title="Cone", source="closed form", exact_map=exact_map)
 @with_levers
 def cone(
-    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 20_000,
+    faces: Annotated[int, Field(ge=24, le=MAX_FACES)] = 20_000,
     *,
     angle: Annotated[float, Field(gt=0, lt=90)] = 30.0,
 ) -> DiskMesh:

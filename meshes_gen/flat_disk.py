@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .disk_grid import disk_grid
 from .levers import with_levers
@@ -17,7 +17,7 @@ from .levers import with_levers
 @surface_family("flat-disk", title="Flat disk", source="closed form")
 @with_levers
 def flat_disk(
-    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 5_000,
+    faces: Annotated[int, Field(ge=24, le=MAX_FACES)] = 5_000,
     *,
     stretch: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,
 ) -> DiskMesh:

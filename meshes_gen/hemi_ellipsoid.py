@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .levers import with_levers
 from .spherical_cap import spherical_cap
@@ -17,7 +17,7 @@ from .spherical_cap import spherical_cap
 @surface_family("hemi-ellipsoid", title="Half ellipsoid", source="closed form")
 @with_levers
 def hemi_ellipsoid(
-    faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 50_000,
+    faces: Annotated[int, Field(ge=24, le=MAX_FACES)] = 50_000,
     *,
     x: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.5,
     y: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 1.0,

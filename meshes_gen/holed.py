@@ -9,7 +9,7 @@ from pydantic import Field
 
 from cembench.core.arrays import Complex, Real
 from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .cache import cached
 from .faces import HO, face_body, mask
@@ -57,7 +57,7 @@ def exact_map(V: Real) -> Complex:
 )
 @with_levers
 def holed_cap(
-    faces: Annotated[int, Field(ge=2_000, le=MOST_FACES)] = 20_000,
+    faces: Annotated[int, Field(ge=2_000, le=MAX_FACES)] = 20_000,
     *,
     holes: Annotated[int, Field(ge=1, le=8)] = 3,
 ) -> HoledMesh:
@@ -78,7 +78,7 @@ def holed_cap(
 )
 @with_levers
 def ho_face_with_holes(
-    faces: Annotated[int, Field(ge=5_000, le=MOST_FACES)] = 100_000,
+    faces: Annotated[int, Field(ge=5_000, le=MAX_FACES)] = 100_000,
     *,
     seed: Annotated[int, Field(ge=0)] = 0,
 ) -> HoledMesh:

@@ -10,7 +10,7 @@ from pydantic import Field
 
 from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.triangle_mesh import HoledMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .levers import with_levers
 
@@ -23,7 +23,7 @@ TURN = np.pi * (3 - np.sqrt(5))
 @surface_family("holed-disk", title="Flat disk with holes", source="closed form")
 @with_levers
 def holed_disk(
-    faces: Annotated[int, Field(ge=500, le=MOST_FACES)] = 20_000,
+    faces: Annotated[int, Field(ge=500, le=MAX_FACES)] = 20_000,
     *,
     holes: Annotated[int, Field(ge=1, le=60)] = 3,
     bend: Annotated[float, Field(ge=0, lt=0.5)] = 0.2,

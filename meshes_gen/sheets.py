@@ -15,12 +15,12 @@ from pydantic import Field
 from cembench.core.arrays import Complex, Real
 from cembench.core.errors import ParameterError
 from cembench.mesh.triangle_mesh import DiskMesh, HoledMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 from .levers import with_levers
 from .rectangle import rectangle_grid, rectangle_to_disk
 
-Faces = Annotated[int, Field(ge=24, le=MOST_FACES)]
+Faces = Annotated[int, Field(ge=24, le=MAX_FACES)]
 
 
 @surface_family("cylinder-sheet", title="Cylinder sheet", source="closed form")

@@ -15,7 +15,7 @@ from pydantic import Field
 
 from cembench.core.arrays import Complex, Indices, Real
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 #: Number of corners of the plan besides the ends of breaklines; share of it in which points lie.
 CORNERS, INSIDE = 5, 0.98
@@ -29,7 +29,7 @@ STEP = 0.003
 
 @surface_family("tin", title="Survey TIN", source="random points, breaklines and needles")
 def tin(
-    faces: Annotated[int, Field(ge=200, le=MOST_FACES)] = 5_000,
+    faces: Annotated[int, Field(ge=200, le=MAX_FACES)] = 5_000,
     *,
     seed: Annotated[int, Field(ge=0, lt=2**63)] = 0,
     breaklines: Annotated[int, Field(ge=1, le=100)] = 10,

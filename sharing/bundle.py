@@ -47,12 +47,12 @@ SUFFIX = ".zip"
 #: The version of RO-Crate that the metadata follow.
 ROCRATE = "https://w3id.org/ro/crate/1.1"
 #: At most this many files, and bytes once unpacked, the arrays in archives of arrays too.
-MOST_FILES, MOST_BYTES = 100_000, 2 * 2**30
+MAX_FILES, MAX_BYTES = 100_000, 2 * 2**30
 #: At most this many bytes of one file of text, which takes twenty times as many when it is read.
-MOST_TEXT = 2**24
+MAX_TEXT = 2**24
 #: Nor may what is unpacked have more bytes than this many times those of the bundle, and a file of
 #: text: records are compressed to a quarter, and maps less.
-MOST_TIMES = 20
+MAX_TIMES = 20
 #: What an archive may hold.
 _NAMES = re.compile(
     rf"(records|environments)/[^/\\:]+\.json|(maps|meshes)/[^/\\:]+\.npz|{METADATA}|{SIGNATURE}"
@@ -308,7 +308,7 @@ def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[
     """
     again = "Ask its sender to pack it again, with `cembench submit`, or leave it out."
     try:
-        most = min(MOST_BYTES, MOST_TEXT + MOST_TIMES * path.stat().st_size)
+        most = min(MAX_BYTES, MAX_TEXT + MAX_TIMES * path.stat().st_size)
         with zipfile.ZipFile(path) as archive:
             members = archive.infolist()
             for what in _unsafe(members, most):
@@ -344,15 +344,15 @@ def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[
 
 def _unsafe(members: Sequence[zipfile.ZipInfo], most: int) -> Iterator[str]:
     """Yield why an archive must not be unpacked; only its list was read."""
-    if len(members) > MOST_FILES:
-        yield f"it holds {len(members):,} files, of at most {MOST_FILES:,}"
+    if len(members) > MAX_FILES:
+        yield f"it holds {len(members):,} files, of at most {MAX_FILES:,}"
     if (size := sum(member.file_size for member in members)) > most:
         yield f"its files have {size:,} bytes, of at most {most:,}"
     names: set[str] = set()
     for member in members:
         mode, name = member.external_attr >> 16, member.filename
-        if not name.endswith(".npz") and member.file_size > MOST_TEXT:
-            yield f"{name!r} has {member.file_size:,} bytes, of at most {MOST_TEXT:,}"
+        if not name.endswith(".npz") and member.file_size > MAX_TEXT:
+            yield f"{name!r} has {member.file_size:,} bytes, of at most {MAX_TEXT:,}"
         if stat.S_IFMT(mode) not in (0, stat.S_IFREG):
             yield f"{name!r} is a link or not a regular file"
         if not _NAMES.fullmatch(name) or name != member.orig_filename or not name.isprintable():

@@ -27,7 +27,7 @@ from .choice import Candidate, best_of
 M = TypeVar("M", DiskMesh, HoledMesh)
 
 #: Repair is tried if at most this share of the triangles fold: it is slow, and hopeless with more.
-MOST_FOLDED = 0.01
+MAX_FOLDED = 0.01
 
 
 def _few_folds(method: Callable[..., Parameterization], cost: float = 1.0) -> Candidate:
@@ -36,7 +36,7 @@ def _few_folds(method: Callable[..., Parameterization], cost: float = 1.0) -> Ca
     def repaired(mesh: DiskMesh | HoledMesh, *, repair: bool) -> Parameterization:
         made = method(mesh, repair=False)
         folded = made.extras["folded_before_repair"]
-        if not (repair and 0 < folded <= MOST_FOLDED * mesh.m) or _overlap(mesh, made.uv):
+        if not (repair and 0 < folded <= MAX_FOLDED * mesh.m) or _overlap(mesh, made.uv):
             return made
         uv, extras = accepted_repair(mesh, made.uv)
         return replace(made, uv=uv, extras=made.extras | extras)

@@ -17,7 +17,7 @@ from cembench.core.clock import phase
 LEASH, STEPS = 0.05, 5
 #: A step must lower E_C by this share, and by more than this many times the relative growth of the
 #: angle error.
-LEAST_GAIN, ANGLE_WEIGHT = 0.0015, 20
+MIN_GAIN, ANGLE_WEIGHT = 0.0015, 20
 #: E_C below this is rounding error.
 ROUNDING = 1e-12
 
@@ -54,7 +54,7 @@ def gauge_walk(
     for _ in range(steps):
         there = here.at(here.domain.through(moebius_descent(here, LEASH)))
         gain = 1 - there.energy / here.energy if here.energy > ROUNDING else 0.0
-        if not gain > LEAST_GAIN:
+        if not gain > MIN_GAIN:
             break
         uv_there = extended(there.domain.points)
         with phase("gauge"):

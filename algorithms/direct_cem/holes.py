@@ -29,7 +29,7 @@ from .gauge_walk import STEPS, gauge_walk
 from .opened import valid_with_holes
 
 #: Largest relative increase of E_C for giving crowded arcs the proportions of the start.
-MOST_COST = 0.01
+MAX_COST = 0.01
 
 
 @algorithm(
@@ -143,7 +143,7 @@ def _settled(
     if domain is here.domain:
         return here, False
     there = here.at(in_gauge(domain, here.weights))
-    if there.energy > (1 + MOST_COST) * here.energy:
+    if there.energy > (1 + MAX_COST) * here.energy:
         return here, False
     errors = [angle_error(extended(model.domain.points)) for model in (here, there)]
     return (there, True) if errors[1] < errors[0] else (here, False)

@@ -36,7 +36,7 @@ SHARES = np.array([0.9, 0.3, 0.0])
 #: Rings of vertices around folds that are laid out again about a circle.
 RINGS = (1, 2, 4)
 #: Patches are no remedy if more than this share of the triangles fold.
-MOST_FOLDED = 0.01
+MAX_FOLDED = 0.01
 #: Circles as exact as this, and as far apart, do not meet.
 ROUND = 1e-6
 #: A repaired map with a mean angle error above so many degrees is compared with the last resort.
@@ -76,7 +76,7 @@ def valid_with_holes(
         folded = flipped_triangles(mesh, own)
         turned = _with_ears_turned(mesh, loops[1:], own) if folded and repair else own
     last_resort = last_resort and repair
-    in_patches = folded <= MOST_FOLDED * mesh.m or not last_resort
+    in_patches = folded <= MAX_FOLDED * mesh.m or not last_resort
     repaired, extras = accepted_repair(mesh, turned, repair=repair and in_patches)
     extras["folded_before_repair"] = folded
     extras["fold_repairs"] += int(turned is not own)

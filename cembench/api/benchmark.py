@@ -27,7 +27,7 @@ from cembench.api.settings import (
 from cembench.core.arguments import Range, checked
 from cembench.core.errors import ParameterError
 from cembench.core.reporter import SILENT, Reporter
-from cembench.results.intervals import LOOKS, USUAL_MOST_ROUNDS, USUAL_PRECISION
+from cembench.results.intervals import LOOKS, USUAL_MAX_ROUNDS, USUAL_PRECISION
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -367,7 +367,7 @@ def benchmark(
     maps: Mapping[str, AnyPath] | None = None,
     precision: float | str | None = None,
     rounds: Rounds | None = None,
-    max_rounds: Annotated[int, Range(LOOKS[1], LOOKS[-1])] = USUAL_MOST_ROUNDS,
+    max_rounds: Annotated[int, Range(LOOKS[1], LOOKS[-1])] = USUAL_MAX_ROUNDS,
     budget: float | str | None = "auto",
     pairing: Literal["auto", "separate", "process"] = "auto",
     repeat_busy: Annotated[int, Range(0, 10)] = 0,

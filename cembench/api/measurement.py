@@ -28,7 +28,7 @@ from cembench.running.given_uvs import surface_and_uv
 from cembench.running.surfaces import load_surface
 
 #: Maximum number of pieces that are mapped anew, the largest first.
-MOST_PIECES = 50
+MAX_PIECES = 50
 #: Share of the surface that must be mapped anew for a comparison.
 COMPARABLE = 0.95
 #: What is mapped anew.
@@ -163,7 +163,7 @@ def _best(figures: UvFigures, mesh: TriangleMesh, reporter: Reporter) -> dict[st
 def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
     """Map the largest pieces of a surface, given by each triangle's number (m,)."""
     errors, spaces, images = list[Real](), list[Real](), list[Real]()
-    for number in np.argsort(-np.bincount(piece, areas))[:MOST_PIECES]:
+    for number in np.argsort(-np.bincount(piece, areas))[:MAX_PIECES]:
         used, F = np.unique(mesh.F[piece == number], return_inverse=True)
         arrays = (mesh.V[used], F.reshape(-1, 3))
         try:

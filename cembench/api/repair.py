@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from cembench.api.settings import MOST_FACES
+from cembench.api.settings import MAX_FACES
 from cembench.core.arguments import Range, checked
 
 if TYPE_CHECKING:
@@ -77,7 +77,7 @@ def repair(
     surface: SurfaceInput,
     *,
     weld: Annotated[float, Range(0.0, 1e60)] | None = None,
-    fill_holes: Annotated[int, Range(0, MOST_FACES)] = 0,
+    fill_holes: Annotated[int, Range(0, MAX_FACES)] = 0,
     components: Literal["largest", "all"] = "largest",
     drop: bool = False,
 ) -> Repair:

@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from cembench.registry import Registry
 
 #: A process needs more than a hundred MiB to load the libraries.
-LEAST_MEMORY, MOST_MEMORY = 2**28, 2**50
+MIN_MEMORY, MAX_MEMORY = 2**28, 2**50
 LONGEST = 10_000_000.0
-MOST_FACES = 1_000_000_000
+MAX_FACES = 1_000_000_000
 
 AnyPath: TypeAlias = str | os.PathLike[str]
 Placement: TypeAlias = Literal["unit", "square", "world", "disk"]
@@ -33,7 +33,7 @@ Backend: TypeAlias = Literal["cvxopt", "cvxopt-metis", "superlu", "pardiso"]
 Threads: TypeAlias = Annotated[int, Range(1, 1024)]
 Timeout: TypeAlias = Annotated[float, Range(0.1, LONGEST)]
 #: Each surface has its own, narrower bounds.
-Faces: TypeAlias = Annotated[int, Range(1, MOST_FACES)]
+Faces: TypeAlias = Annotated[int, Range(1, MAX_FACES)]
 Rounds: TypeAlias = Annotated[int, Range(1, 10_000)]
 Seed: TypeAlias = Annotated[int, Range(0, 2**63 - 1)]
 
@@ -121,7 +121,7 @@ def bytes_of(memory_bytes: int | str | None) -> int:
         raise ParameterError(
             f"{setting} is not a size; write a number with a unit, e.g. 4GiB or 500MB."
         ) from None
-    if not LEAST_MEMORY <= size <= MOST_MEMORY:
+    if not MIN_MEMORY <= size <= MAX_MEMORY:
         raise ParameterError(
             f"{setting} is {size:,} bytes; allowed: 256MiB (a process needs more than half of that "
             "to load the libraries) to 1024TiB."

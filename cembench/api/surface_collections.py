@@ -35,10 +35,10 @@ MANIFEST = "MANIFEST.tsv"
 #: Maximum size of an archive member, in bytes.
 LARGEST_MEMBER = 2**31
 #: Maximum number of archive members that are examined.
-MOST_MEMBERS = 1_000_000
+MAX_MEMBERS = 1_000_000
 #: Maximum size of a header in a TAR archive, which is read at once, and how many times its own size
 #: such an archive may unpack to, beside one member of the maximum size.
-LARGEST_HEADER, MOST_UNPACKED = 2**24, 200
+LARGEST_HEADER, MAX_UNPACKED = 2**24, 200
 _PIECE = 2**20
 
 
@@ -229,7 +229,7 @@ def _members(path: Path) -> Generator[_Member, None, None]:
     """Yield the regular files of an archive that have the suffix of a mesh format."""
     if zipfile.is_zipfile(path):
         with zipfile.ZipFile(path) as archive:
-            for info in archive.infolist()[:MOST_MEMBERS]:
+            for info in archive.infolist()[:MAX_MEMBERS]:
                 inside = PurePosixPath(info.filename)
                 is_link = (info.external_attr >> 28) == 0o12
                 if not info.is_dir() and not is_link and is_named_like_a_mesh(Path(inside.name)):
@@ -239,7 +239,7 @@ def _members(path: Path) -> Generator[_Member, None, None]:
     with _unpacking(path) as content, tarfile.open(fileobj=cast(BinaryIO, content)) as archive_:
         for count, member in enumerate(archive_):
             inside = PurePosixPath(member.name)
-            if count >= MOST_MEMBERS:
+            if count >= MAX_MEMBERS:
                 return
             if member.isreg() and is_named_like_a_mesh(Path(inside.name)):
                 taken = lambda member=member: cast(BinaryIO, archive_.extractfile(member))  # noqa: E731
@@ -261,7 +261,7 @@ class _Bounded:
     def seek(self, place: int) -> int:
         if place > self._most:
             raise tarfile.ReadError(
-                f"it unpacks to more than {self._most:,} bytes, {MOST_UNPACKED} times its own size"
+                f"it unpacks to more than {self._most:,} bytes, {MAX_UNPACKED} times its own size"
             )
         return self._file.seek(place)
 
@@ -274,7 +274,7 @@ def _unpacking(path: Path) -> Iterator[_Bounded]:
     openers = {b"\x1f\x8b": gzip.open, b"BZh": bz2.open, b"\xfd7zXZ": lzma.open}
     opener = next((one for magic, one in openers.items() if start.startswith(magic)), open)
     with cast(Callable[[Path, str], BinaryIO], opener)(path, "rb") as content:
-        yield _Bounded(content, LARGEST_MEMBER + MOST_UNPACKED * path.stat().st_size)
+        yield _Bounded(content, LARGEST_MEMBER + MAX_UNPACKED * path.stat().st_size)
 
 
 def _unpacked(member: _Member, names: Names, folder: Path, archive: Path) -> Provided:

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-from cembench.api.settings import MOST_FACES, AnyPath, Rounds, Threads, Timeout
+from cembench.api.settings import MAX_FACES, AnyPath, Rounds, Threads, Timeout
 from cembench.core.arguments import Range, checked
 from cembench.core.reporter import SILENT, Reporter
 from cembench.results.intervals import DEFAULT_ROUNDS
@@ -27,9 +27,9 @@ def validate(
     profile: Literal["quick", "standard", "paper"] | None = None,
     surfaces: Iterable[SurfaceInput] = (),
     mesh_dir: Sequence[AnyPath] = (),
-    faces: Annotated[int, Range(24, MOST_FACES)] | None = None,
+    faces: Annotated[int, Range(24, MAX_FACES)] | None = None,
     rounds: Rounds = DEFAULT_ROUNDS,
-    up_to: Annotated[int, Range(0, MOST_FACES)] = 30_000,
+    up_to: Annotated[int, Range(0, MAX_FACES)] = 30_000,
     parameters: Mapping[str, Any] | None = None,
     require: Sequence[Literal["faster", "not-slower", "better", "not-worse", "no-folds"]] = (),
     checks_only: bool = False,

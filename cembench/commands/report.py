@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 #: What ``--json`` has of the paper.
 CITATION = {"title", "authors", "place", "doi"}
 #: Processes that draw, at most: each holds a surface with its maps.
-MOST_DRAWING = 2
+MAX_DRAWING = 2
 
 
 @app.command(
@@ -59,7 +59,7 @@ def drawing_jobs() -> int:
     """Return the number of processes that draw a report."""
     from cembench.running.environment import usable_cores
 
-    return min(usable_cores(), MOST_DRAWING)
+    return min(usable_cores(), MAX_DRAWING)
 
 
 def show_report(report: Report, folder: Path) -> None:

@@ -21,7 +21,7 @@ from cembench.linear_algebra.cholesky import Cholesky
 from cembench.mesh.triangle_mesh import DiskMesh
 
 #: A step counts if it lowers the mean angle error by this share.
-LEAST_GAIN = 1e-3
+MIN_GAIN = 1e-3
 #: |mu| below this share of its median weighs as much as that.
 FLOOR = 0.1
 #: Multiple of the matrix's diagonal that is added: Moebius maps cost next to nothing.
@@ -33,7 +33,7 @@ HALVINGS = 6
 def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
     """Return a map to the disk with a smaller mean angle error, and the number of steps taken.
 
-    Each step lowers the mean angle error, by a share of :data:`LEAST_GAIN` at least, and folds no
+    Each step lowers the mean angle error, by a share of :data:`MIN_GAIN` at least, and folds no
     more triangles; the boundary stays on the circle, in order.
 
     Parameters
@@ -86,7 +86,7 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
         for halved in range(HALVINGS):
             tried = _moved(mesh, uv, step / 2**halved)
             new = float(angle_errors(mesh, tried).mean())
-            if new < (1 - LEAST_GAIN) * error and flipped_triangles(mesh, tried) <= folds:
+            if new < (1 - MIN_GAIN) * error and flipped_triangles(mesh, tried) <= folds:
                 break
         else:
             return uv, taken

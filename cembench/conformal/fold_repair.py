@@ -14,7 +14,7 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 #: A repair that multiplies one of these metrics by more is rejected. The mean angle error flatters
 #: a folded map, since a reflected triangle has the right angles; E_C does not.
-MOST_COST = {"conformal_energy": 1.25, "angle_error_mean_deg": 1.5}
+MAX_COST = {"conformal_energy": 1.25, "angle_error_mean_deg": 1.5}
 
 
 def accepted_repair(
@@ -64,7 +64,7 @@ def accepted_repair(
         old = figures(mesh, own, folded)
         new = figures(mesh, after, flipped_triangles(mesh, after))
     extras |= {"fold_repairs": rounds, "before_repair": old}
-    if all(new[name] <= most * max(old[name], 0) for name, most in MOST_COST.items()):
+    if all(new[name] <= most * max(old[name], 0) for name, most in MAX_COST.items()):
         return after, extras
     return own, extras | {"refused_repair": new}
 

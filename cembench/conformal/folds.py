@@ -24,7 +24,7 @@ from cembench.mesh.triangle_mesh import DiskMesh, TriangleMesh
 
 #: Gap between boundary vertices that changed places, in radians: just enough to be distinct in
 #: doubles.
-LEAST_ARC = 1e-12
+MIN_ARC = 1e-12
 #: Outward shift of the tip of a triangle with all corners on the circle, if they are so close that
 #: the triangle has no area in doubles.
 HEIGHT = 4 * np.finfo(float).eps
@@ -143,7 +143,7 @@ def _on_boundary_without_folds(mesh: DiskMesh, circle: Complex) -> Complex:
     return ordered
 
 
-def in_order(circle: Complex, least: float | Real = LEAST_ARC) -> Complex:
+def in_order(circle: Complex, least: float | Real = MIN_ARC) -> Complex:
     """Return the nearest points of the unit circle that go around it counter-clockwise.
 
     The angles (k,) are replaced by their isotonic regression; points that are in order stay. Points

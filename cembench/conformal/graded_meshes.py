@@ -36,7 +36,7 @@ SAMPLE = 4_000
 USUAL_STEPS = 2
 #: If more degrees of mean angle error are left there, or with that share of needles alone,
 #: triangles are split so many times, as long as there are not more of them than this.
-POOR, USUAL_SPLITS, MOST_TRIANGLES = 5.0, 2, 25_000
+POOR, USUAL_SPLITS, MAX_TRIANGLES = 5.0, 2, 25_000
 
 
 def better_if_graded(method: Callable[..., Parameterization]) -> Callable[..., Parameterization]:
@@ -103,7 +103,7 @@ def usual_splits(faces: int) -> int:
     (2, 1, 0)
 
     """
-    return sum(faces * 4**k <= MOST_TRIANGLES for k in range(1, USUAL_SPLITS + 1))
+    return sum(faces * 4**k <= MAX_TRIANGLES for k in range(1, USUAL_SPLITS + 1))
 
 
 def _by_split_surface(

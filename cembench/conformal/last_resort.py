@@ -1,7 +1,7 @@
 """A valid map of a disk wherever doubles hold one, whatever an algorithm returned.
 
 A triangle whose three corners lie on arcs of length h has an area of about h^3 / 4, and its sign is
-lost in rounding below :data:`LEAST_ARC`; so arcs at folds are widened to that. The interior around
+lost in rounding below :data:`MIN_ARC`; so arcs at folds are widened to that. The interior around
 the folds is laid out again in patches (:mod:`cembench.conformal.folds`). Where that is not enough,
 or costs angles, the surface's mean value weights place the vertices of the smallest patches around
 the folds that are left, and E_C is lowered there by steps that fold nothing. Where that costs
@@ -23,8 +23,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from cembench.conformal.fold_repair import MOST_COST, figures
-from cembench.conformal.folds import LEAST_ARC as DISTINCT
+from cembench.conformal.fold_repair import MAX_COST, figures
+from cembench.conformal.folds import MIN_ARC as DISTINCT
 from cembench.conformal.folds import in_order, interior_without_folds, without_folds
 from cembench.conformal.harmonic import arc_length_circle
 from cembench.conformal.laplacian import laplacian
@@ -42,21 +42,21 @@ from cembench.mesh.triangle_mesh import DiskMesh
 DiskAlgorithm = Callable[..., Parameterization]
 
 #: Shortest arc, in radians, between the corners of a triangle that doubles resolve.
-LEAST_ARC = 3e-8
+MIN_ARC = 3e-8
 #: Numbers of rings of vertices around the folds that are laid out again; more of them do not help.
 PATCH_RINGS = (1, 2)
 #: Numbers of rings of vertices around the folds that get the surface's weights.
 RINGS = (0, 2, 8)
 #: Patches are no remedy if more than this share of the triangles fold; they are all that is tried
 #: if they raise the mean angle error by no more than the share CHEAP.
-MOST_FOLDED, CHEAP = 0.3, 0.01
+MAX_FOLDED, CHEAP = 0.3, 0.01
 #: Rings of vertices around folds that mean value weights place in patches, and how many times.
 MEANS_RINGS, MEANS_ROUNDS = (0, 1, 2, 4), 8
 #: A valid map is good enough if its mean angle error is at most so many degrees above that of the
 #: algorithm's own map, and not above so many.
 ENOUGH, GOOD = 1.0, 10.0
 #: Up to this size the whole interior is laid out again, twice, if the above costs more, or is bad.
-MOST_TRIANGLES = 20_000
+MAX_TRIANGLES = 20_000
 #: Newton steps for that, and for patches. They start at a valid map; two are often enough.
 LAYOUT_STEPS = 8
 #: A map whose mean angle error, in degrees, is above this may be worse than mean value weights
@@ -164,7 +164,7 @@ class _Choice:
     """The best map offered: fewest folds, E_C in bounds, then least mean angle error.
 
     E_C is in bounds up to a multiple of that of the algorithm's own map
-    (:data:`cembench.conformal.fold_repair.MOST_COST`). It says nothing of maps with angle errors
+    (:data:`cembench.conformal.fold_repair.MAX_COST`). It says nothing of maps with angle errors
     above :data:`BAD`, which come last.
     """
 
@@ -175,7 +175,7 @@ class _Choice:
         self.by_means = self.solves = 0
         if own is not None:
             energy = figures(mesh, own, 0)["conformal_energy"]
-            self.most_energy = MOST_COST["conformal_energy"] * max(energy, 0)
+            self.most_energy = MAX_COST["conformal_energy"] * max(energy, 0)
             self.offer(own)
 
     @functools.cached_property
@@ -229,7 +229,7 @@ class _Choice:
 def _offer_patches(choice: _Choice, own: Complex, folded: int) -> int:
     """Offer the map with the interior around folds laid out again; return the rounds."""
     mesh = choice.mesh
-    if folded > MOST_FOLDED * mesh.m:
+    if folded > MAX_FOLDED * mesh.m:
         return 0
     # No layout of the interior removes a fold whose corners are all on the boundary.
     corners = mesh.F[folded_triangles(own, mesh.F)]
@@ -250,7 +250,7 @@ def _offer_means_in_patches(choice: _Choice) -> None:
     """
     mesh, start = choice.mesh, choice.z
     folded = folded_triangles(start, mesh.F)
-    if len(folded) > MOST_FOLDED * mesh.m:
+    if len(folded) > MAX_FOLDED * mesh.m:
         return
     graph, W, inside = choice.graph, choice.weights, choice.inside
     for rings in MEANS_RINGS:
@@ -277,7 +277,7 @@ def _offer_means_in_patches(choice: _Choice) -> None:
 def _offer_harmonic_map(choice: _Choice, own: Complex, folded: int) -> int:
     """Offer the map that repair alone makes: harmonic again, then patches; return the rounds."""
     mesh = choice.mesh
-    if folded > MOST_FOLDED * mesh.m:
+    if folded > MAX_FOLDED * mesh.m:
         return 0
     with contextlib.suppress(AlgorithmFailed):
         z, rounds = without_folds(mesh, laplacian(mesh, delaunay=True), own)
@@ -305,7 +305,7 @@ def _offer_layouts(choice: _Choice) -> None:
     First by steps that may fold on the way, which go farther, and then by steps that may not.
     """
     mesh = choice.mesh
-    if choice.cost[0] or mesh.m > MOST_TRIANGLES or not choice.inside.any():
+    if choice.cost[0] or mesh.m > MAX_TRIANGLES or not choice.inside.any():
         return
     for first in (FIRST, 0.0):
         laid_out, _ = untangled(mesh, choice.z, choice.inside, choice.graph, LAYOUT_STEPS, first)
@@ -341,7 +341,7 @@ def _widened(mesh: DiskMesh, z: Complex, vertices: NDArray[np.int64]) -> Complex
     None if the boundary does not go around the circle.
     """
     at = np.isin(mesh.boundary, vertices)
-    least = np.where(at | np.roll(at, -1), LEAST_ARC, DISTINCT)
+    least = np.where(at | np.roll(at, -1), MIN_ARC, DISTINCT)
     widened = z.copy()
     try:
         widened[mesh.boundary] = in_order(z[mesh.boundary], least)

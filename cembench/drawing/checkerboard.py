@@ -16,7 +16,7 @@ from cembench.core.arrays import Indices, Real
 #: Parts along the side of a divided square; odd, so that corners keep their colour.
 FINER = 3
 #: Maximal depth of the subdivision.
-MOST_LEVELS = 10
+MAX_LEVELS = 10
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Checkerboard:
         board = np.full(int(across * up), -1, dtype=np.int64)
         node = _roots(places, low, int(across))
         active, start, depth = np.arange(len(places)), 0, 0
-        for level in range(MOST_LEVELS):
+        for level in range(MAX_LEVELS):
             size = len(board)
             weight = np.bincount(node[active], weights[active], minlength=size)
             total = np.bincount(node[active], (weights * fineness)[active], minlength=size)

@@ -19,7 +19,7 @@ from scipy import ndimage
 
 from cembench.core.arrays import Complex, Indices, Mask, Picture, Real
 from cembench.drawing import scene as look
-from cembench.drawing.checkerboard import FINER, MOST_LEVELS
+from cembench.drawing.checkerboard import FINER, MAX_LEVELS
 from cembench.drawing.rasterizer import Raster, rasterize
 from cembench.mesh.side_lengths import side_lengths
 from cembench.mesh.triangle_mesh import TriangleMesh
@@ -150,7 +150,7 @@ def checkerboard(panel: Panel, board: look.Board) -> Colouring:
     places = board.places[F].reshape(-1, 2)
     drawn, flat = (np.abs(look.doubled_areas(c)) for c in (panel.corners, board.places[F]))
     pixels = np.sqrt(drawn / np.maximum(flat, look.TINY)) / SAMPLES
-    smaller = float(FINER) ** -np.arange(MOST_LEVELS + 1)
+    smaller = float(FINER) ** -np.arange(MAX_LEVELS + 1)
 
     def colouring(raster: Raster) -> Real:
         dark, level = board.squares.at(raster.interpolate(places))

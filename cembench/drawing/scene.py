@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from cembench.conformal.planar import signed_areas
 from cembench.core.arrays import Complex, Indices, Real
 from cembench.drawing.camera import view_rotation
-from cembench.drawing.checkerboard import FINER, MOST_LEVELS, Checkerboard
+from cembench.drawing.checkerboard import FINER, MAX_LEVELS, Checkerboard
 from cembench.mesh.triangle_mesh import TriangleMesh
 
 #: Squares of the coarsest checkerboard across the image.
@@ -25,7 +25,7 @@ LARGEST_SQUARE = 0.22
 #: Rounds of averaging the sizes of squares over neighbours, for smooth borders of refinement.
 CALMING = 3
 #: Side of the smallest detail in the image that a person notices.
-LEAST_VISIBLE = 0.02
+MIN_VISIBLE = 0.02
 #: Replaces an area of zero.
 TINY = 1e-300
 #: Share of a panel's half width that the drawing takes.
@@ -81,7 +81,7 @@ def folded_by(uv: Complex, F: Indices) -> NDArray[np.bool_]:
 def small_folds(uv: Complex, F: Indices) -> Real:
     """Return the centres (k, 2) of those folds F (j, 3) that are too small to be seen."""
     corners = image_in_window(uv)[F][:, :, :2]
-    return corners[np.abs(doubled_areas(corners)) < LEAST_VISIBLE**2].mean(axis=1)
+    return corners[np.abs(doubled_areas(corners)) < MIN_VISIBLE**2].mean(axis=1)
 
 
 def image_in_window(uv: Complex) -> Real:
@@ -137,4 +137,4 @@ def fineness_of(F: Indices, space: Real, board: Real) -> Real:
     log_side = np.log(weight / np.maximum(_to_vertices(F, on_board, n), TINY)) / 2
     for _ in range(CALMING):
         log_side = _to_vertices(F, area * log_side[F].mean(axis=1), n) / weight
-    return np.clip((log_side - np.log(LARGEST_SQUARE)) / np.log(FINER), -1, MOST_LEVELS)
+    return np.clip((log_side - np.log(LARGEST_SQUARE)) / np.log(FINER), -1, MAX_LEVELS)

@@ -21,7 +21,7 @@ from cembench.results.runs_compared import Change, Row
 from cembench.running.estimate import Estimate
 
 #: Maximum number of causes listed.
-MOST_CAUSES = 8
+MAX_CAUSES = 8
 FEW_ROUNDS = "too few rounds"
 #: The figures of :func:`maps_table`, each before and after.
 MAP_FIGURES = ("E_C", "mean angle error", "folds")
@@ -203,10 +203,10 @@ def many_table(evidence: Evidence) -> Table:
     causes = frame.value_counts(sort=False).sort_values(ascending=False, kind="stable")
     notes = [
         f"{count:>6}  {name}: {status}, {kind.replace('_', ' ')}"
-        for (name, status, kind), count in causes[:MOST_CAUSES].items()
+        for (name, status, kind), count in causes[:MAX_CAUSES].items()
     ]
-    if len(causes) > MOST_CAUSES:
-        notes.append(f"        and {len(causes) - MOST_CAUSES} other kinds")
+    if len(causes) > MAX_CAUSES:
+        notes.append(f"        and {len(causes) - MAX_CAUSES} other kinds")
     table = declared_table(evidence, "many", notes=notes)
     assert table is not None, "a run has records"
     return table

@@ -22,11 +22,11 @@ from typing import Any, NoReturn
 from cembench.core.errors import ParameterError
 
 #: Most characters of an expression, and parts of it within each other; ours have 661 and 12.
-MOST_CHARACTERS, MOST_DEPTH = 4000, 40
+MAX_CHARACTERS, MAX_DEPTH = 4000, 40
 #: Most characters or entries, bits of a whole number, and digits of a width or precision.
-MOST_LENGTH, MOST_BITS, MOST_DIGITS = 100_000, 1024, 3
+MAX_LENGTH, MAX_BITS, MAX_DIGITS = 100_000, 1024, 3
 #: CPU seconds that an expression may take, with the functions of a paper's folder that it calls.
-MOST_SECONDS = 120.0
+MAX_SECONDS = 120.0
 #: What a value may be asked for: everything else of a column is out of reach.
 METHODS = frozenset(
     {"isin", "isna", "notna", "str", "startswith", "endswith", "contains", "abs", "len"}
@@ -52,7 +52,7 @@ def computed(expression: str, known: Mapping[str, Any]) -> Any:
     """
     code, _ = _compiled(expression)
     try:
-        with _within(MOST_SECONDS):
+        with _within(MAX_SECONDS):
             return _bounded(eval(code, {"__builtins__": {}, **_OPERATORS}, dict(known)))
     except Exception as error:
         raise ParameterError(f"{_shown(expression)} fails on this run: {error}.") from error
@@ -67,9 +67,9 @@ def names_in(expression: str, *, text: bool = False) -> tuple[str, ...]:
 def _compiled(expression: str) -> tuple[CodeType, tuple[str, ...]]:
     """Return the code of an expression, with bounded operators, and the names in it."""
     shown = _shown(expression)
-    if len(expression) > MOST_CHARACTERS:
+    if len(expression) > MAX_CHARACTERS:
         raise ParameterError(
-            f"{shown} has {len(expression):,} characters; allowed are {MOST_CHARACTERS:,}. What "
+            f"{shown} has {len(expression):,} characters; allowed are {MAX_CHARACTERS:,}. What "
             "needs more is a function of checks.py."
         )
     try:
@@ -98,8 +98,8 @@ def _nodes(tree: ast.AST, shown: str) -> Iterator[ast.AST]:
     while level:
         yield from level
         level, depth = [part for node in level for part in ast.iter_child_nodes(node)], depth + 1
-        if depth > MOST_DEPTH:
-            raise ParameterError(f"{shown} has parts within parts, more than {MOST_DEPTH} deep.")
+        if depth > MAX_DEPTH:
+            raise ParameterError(f"{shown} has parts within parts, more than {MAX_DEPTH} deep.")
 
 
 def _is_wide(node: ast.AST) -> bool:
@@ -112,7 +112,7 @@ def _is_wide(node: ast.AST) -> bool:
 
 
 def _has_many_digits(form: str) -> bool:
-    return any(len(digits) > MOST_DIGITS for digits in re.findall(r"\d+", form))
+    return any(len(digits) > MAX_DIGITS for digits in re.findall(r"\d+", form))
 
 
 def with_words(text: str, *values: object, **known: object) -> str:
@@ -150,14 +150,14 @@ class _Bounded(ast.NodeTransformer):
 
 def _power(a: Any, b: Any) -> Any:
     if isinstance(a, int) and isinstance(b, int):
-        _check(a.bit_length() * abs(b), MOST_BITS, "bits")
+        _check(a.bit_length() * abs(b), MAX_BITS, "bits")
     return a**b
 
 
 def _times(a: Any, b: Any) -> Any:
     for one, other in ((a, b), (b, a)):
         if isinstance(one, str | list | tuple) and isinstance(other, int):
-            _check(len(one) * other, MOST_LENGTH, "characters or entries")
+            _check(len(one) * other, MAX_LENGTH, "characters or entries")
     return a * b
 
 
@@ -185,9 +185,9 @@ _OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
 def _bounded(value: Any) -> Any:
     """Return a value that is not huge."""
     if isinstance(value, int):
-        _check(value.bit_length(), MOST_BITS, "bits")
+        _check(value.bit_length(), MAX_BITS, "bits")
     elif isinstance(value, str | list | tuple):
-        _check(len(value), MOST_LENGTH, "characters or entries")
+        _check(len(value), MAX_LENGTH, "characters or entries")
     return value
 
 

@@ -73,7 +73,7 @@ _LATER = (1 - _FIRST) / (len(LOOKS) - 1)
 #: Default precision: largest half-width of an interval, relative to its figure.
 USUAL_PRECISION = 0.05
 #: Default maximum number of rounds of a cell.
-USUAL_MOST_ROUNDS = 56
+USUAL_MAX_ROUNDS = 56
 
 
 def share(rounds: int) -> float:

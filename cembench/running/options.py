@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cembench.results.intervals import USUAL_MOST_ROUNDS
+from cembench.results.intervals import USUAL_MAX_ROUNDS
 from cembench.results.records import REFERENCE, Record
 from cembench.running.pairing import Pairing
 
@@ -31,7 +31,7 @@ class Options:
     #: The algorithm that the others are compared with: their ratios to it become precise.
     reference: str = REFERENCE
     #: Rounds of a cell that is measured until it is precise, at most.
-    most_rounds: int = USUAL_MOST_ROUNDS
+    most_rounds: int = USUAL_MAX_ROUNDS
     #: Time budget in wall-clock seconds, after which only first rounds are made; None: no limit.
     #: It does not shorten a fixed number of rounds.
     budget: float | None = None

@@ -48,7 +48,7 @@ CLOSE = 0.25
 COLLAPSED, POOR = 0.25, 10.0
 #: Above this number of degrees a map is also compared with a free boundary, and is far from
 #: conformal above this multiple of its mean angle error; not on larger surfaces, to save memory.
-COMPARED, FAR_FROM_FREE, MOST_TRIANGLES = 5.0, 4.0, 1_000_000
+COMPARED, FAR_FROM_FREE, MAX_TRIANGLES = 5.0, 4.0, 1_000_000
 #: A triangle is crowded if its image is below this share of the mean image area; crowding is named
 #: as a cause above this share of crowded triangles.
 CROWDED_AREA, CROWDED_SHARE = 1e-6, 0.02
@@ -229,10 +229,10 @@ def free_map(mesh: TriangleMesh) -> tuple[float, str]:
 
     It is the map of least E_C by the surface's triangles or by the intrinsic Delaunay ones (LSCM),
     of a surface with holes that of the disk it is cut into: one factorisation each. Infinite where
-    it has folds, where it cannot be computed, and above :data:`MOST_TRIANGLES`.
+    it has folds, where it cannot be computed, and above :data:`MAX_TRIANGLES`.
     """
     best = np.inf, ""
-    if not isinstance(mesh, DiskMesh | HoledMesh) or mesh.m > MOST_TRIANGLES:
+    if not isinstance(mesh, DiskMesh | HoledMesh) or mesh.m > MAX_TRIANGLES:
         return best
     disk, cut = (mesh, "") if isinstance(mesh, DiskMesh) else (cut_open(mesh).mesh, "--cut ")
     pins = two_distant_vertices(disk)

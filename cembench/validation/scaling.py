@@ -27,18 +27,18 @@ from cembench.validation.finding import ValidationFinding, finding
 
 #: Largest allowed exponent. Factoring the Laplacian of a planar mesh costs faces^1.5
 #: in theory; 0.25 allows for iteration counts that grow with the mesh.
-MOST_EXPONENT = 1.75
+MAX_EXPONENT = 1.75
 #: Largest allowed difference from the reference, whose own exponent is 1 at most at these sizes.
-MOST_ABOVE_REFERENCE = 0.75
+MAX_ABOVE_REFERENCE = 0.75
 #: Minimum triangles of the largest mesh.
-LEAST_UP_TO = 900
+MIN_UP_TO = 900
 #: Rounds that are measured on all sizes; later ones only on the two that count.
 FIRST_ROUNDS = 2
 #: Maximum number of rounds: four looks.
-MOST_ROUNDS = LOOKS[3]
+MAX_ROUNDS = LOOKS[3]
 #: Seconds that the rounds up to the first look may take after the first ones, and the stage with
 #: later looks; what looks too steep gets its first look however long that takes.
-MOST_SECONDS = 60.0
+MAX_SECONDS = 60.0
 #: Our CPU seconds count if they are this share of the wall clock; else the solver waits.
 _LEAST_CPU = 0.1
 #: Phase whose growth is shown too.
@@ -100,9 +100,9 @@ def sizes(up_to: int) -> tuple[int, ...]:
         `up_to` is so small that the start of a call dominates.
 
     """
-    if up_to < LEAST_UP_TO:
+    if up_to < MIN_UP_TO:
         raise ParameterError(
-            f"up_to={up_to} is too few to fit an exponent; allowed are {LEAST_UP_TO:,} triangles "
+            f"up_to={up_to} is too few to fit an exponent; allowed are {MIN_UP_TO:,} triangles "
             "and more, or 0 to leave that stage out."
         )
     return up_to // 9, up_to // 3, up_to
@@ -118,9 +118,9 @@ def answer_of(exponents: Sequence[float], above: Sequence[float] | None) -> Grow
     if own is None:
         return GrowthAnswer.inconclusive
     beside = None if above is None else _interval(above)
-    if own.low > MOST_EXPONENT and (beside is None or beside.low > MOST_ABOVE_REFERENCE):
+    if own.low > MAX_EXPONENT and (beside is None or beside.low > MAX_ABOVE_REFERENCE):
         return GrowthAnswer.too_steep
-    if own.high <= MOST_EXPONENT or (beside and beside.high <= MOST_ABOVE_REFERENCE):
+    if own.high <= MAX_EXPONENT or (beside and beside.high <= MAX_ABOVE_REFERENCE):
         return GrowthAnswer.fine
     return GrowthAnswer.inconclusive
 
@@ -159,20 +159,20 @@ def growth_of(
 
 
 def more_rounds(
-    growth: GrowthComparison, spent: float, seconds_a_round: float, most: float = MOST_SECONDS
+    growth: GrowthComparison, spent: float, seconds_a_round: float, most: float = MAX_SECONDS
 ) -> int:
     """Return how many rounds are to be added; 0 if the answer is clear or time is used up.
 
     What looks too steep after the first rounds is not left there: it gets its interval.
     """
     rounds = growth.ours.rounds
-    if rounds >= MOST_ROUNDS or growth.answer is not GrowthAnswer.inconclusive:
+    if rounds >= MAX_ROUNDS or growth.answer is not GrowthAnswer.inconclusive:
         return 0
-    more = next_look(rounds, MOST_ROUNDS) - rounds
+    more = next_look(rounds, MAX_ROUNDS) - rounds
     first = growth.ours.interval is None
     if more * seconds_a_round + (0 if first else spent) <= most:
         return more
-    return more if first and growth.ours.exponent > MOST_EXPONENT else 0
+    return more if first and growth.ours.exponent > MAX_EXPONENT else 0
 
 
 def seconds_a_round(records: Sequence[Record]) -> float:
@@ -193,8 +193,8 @@ def scales(growth: GrowthComparison | None) -> ValidationFinding:
         "it could not be timed on two sizes" if growth is None else _words(growth),
         ok=growth is not None and growth.answer is not GrowthAnswer.too_steep,
         undecided=growth is not None and growth.answer is GrowthAnswer.inconclusive,
-        most=MOST_EXPONENT,
-        above=MOST_ABOVE_REFERENCE,
+        most=MAX_EXPONENT,
+        above=MAX_ABOVE_REFERENCE,
     )
 
 

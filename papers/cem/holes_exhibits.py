@@ -35,7 +35,7 @@ from .holes import STAND_IN, HoledMaps
 from .page import page
 
 #: Maximum number of steps in a picture; further steps are left out.
-MOST_STEPS = 4
+MAX_STEPS = 4
 #: Pixels of a step's picture, how many are in a row, and how boundaries are drawn on them.
 SIDE, COLUMNS = 460, 4
 OPEN, CLOSED = {"color": "#c8553d", "linewidth": 1.8}, {"color": INK, "linewidth": 0.8}
@@ -164,7 +164,7 @@ def _write_figure_exhibits(
         text=f"The result of one sweep of Koebe's method. {caption}.",
         facts=figures,
     )
-    if len(mesh.loops) > MOST_STEPS:
+    if len(mesh.loops) > MAX_STEPS:
         return
     first = [step for step in steps if step.sweep == 1]
     outer_loop, others = mesh.outer_and_holes(outer)

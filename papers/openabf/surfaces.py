@@ -12,7 +12,7 @@ import numpy as np
 from pydantic import Field
 
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, surface_family
+from cembench.registry import MAX_FACES, surface_family
 
 #: Height of the waves, for squares of side 1.
 AMPLITUDE = 0.3
@@ -20,7 +20,7 @@ SOURCE = "educelab/OpenABF, BenchmarkFlattening.cpp"
 
 
 @surface_family("openabf-wavy", title="OpenABF's wavy square", source=f"{SOURCE} (pull request 46)")
-def wavy(faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 50_000) -> DiskMesh:
+def wavy(faces: Annotated[int, Field(ge=24, le=MAX_FACES)] = 50_000) -> DiskMesh:
     """A square grid of unit squares with one wave in each direction: nearly flat.
 
     z = 0.3 sin(2 pi x / k) cos(2 pi y / k) on the k by k squares, k = floor(sqrt(faces / 2)), each
@@ -38,7 +38,7 @@ def wavy(faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 50_000) -> DiskMes
 @surface_family(
     "openabf-sphere", title="OpenABF's hemisphere", source=f"{SOURCE} (pull request 87)"
 )
-def sphere(faces: Annotated[int, Field(ge=24, le=MOST_FACES)] = 50_000) -> DiskMesh:
+def sphere(faces: Annotated[int, Field(ge=24, le=MAX_FACES)] = 50_000) -> DiskMesh:
     """The unit hemisphere in rings of equal latitude, each with as many vertices.
 
     `rings` = floor(sqrt(faces / 8)) + 1 rings of 4 `rings` vertices around the pole: the triangles

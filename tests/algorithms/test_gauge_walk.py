@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from cembench.algorithms.direct_cem.gauge_walk import LEAST_GAIN, STEPS, gauge_walk
+from cembench.algorithms.direct_cem.gauge_walk import MIN_GAIN, STEPS, gauge_walk
 
 from cembench import DiskMesh
 from cembench.conformal.bordered import BorderedLaplacian
@@ -26,7 +26,7 @@ def test_energy_falls_while_angles_stay(hill):
     uv, walked = gauge_walk(here, bordered.harmonic_extension, lambda uv: 1.0)
     energies = (here.energy, *walked)
     assert 1 < len(energies) <= STEPS + 1
-    assert (-np.diff(energies) > LEAST_GAIN * np.array(energies[:-1])).all()
+    assert (-np.diff(energies) > MIN_GAIN * np.array(energies[:-1])).all()
     assert energies[-1] == pytest.approx(all_metrics(mesh, uv)["conformal_energy"], rel=1e-9)
 
 

@@ -11,7 +11,7 @@ from cembench.algorithms.qiem import qiem
 
 from cembench import AlgorithmFailed
 from cembench.conformal import fold_repair
-from cembench.conformal.fold_repair import MOST_COST, accepted_repair
+from cembench.conformal.fold_repair import MAX_COST, accepted_repair
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.files import read_mesh
@@ -69,7 +69,7 @@ def test_a_repair_that_costs_too_much_is_refused_and_its_figures_recorded(monkey
     assert taken is own
     assert extras["folded_before_repair"] == 6
     refused, before = extras["refused_repair"], extras["before_repair"]
-    assert any(refused[figure] > most * before[figure] for figure, most in MOST_COST.items())
+    assert any(refused[figure] > most * before[figure] for figure, most in MAX_COST.items())
 
 
 def crumpled_holes():

@@ -12,7 +12,7 @@ from cembench.surfaces.tin import tin
 from cembench import AlgorithmFailed, DiskMesh
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
-from cembench.conformal.last_resort import LEAST_ARC, valid_map
+from cembench.conformal.last_resort import MIN_ARC, valid_map
 from cembench.conformal.metrics import (
     MapFigures,
     all_metrics,
@@ -88,7 +88,7 @@ def test_corners_too_close_for_doubles_are_moved_apart_and_hardly_anything_else(
     assert not flipped_triangles(mesh, uv)
     assert 0 < extras["last_resort"]["moved_boundary_vertices"] <= 3
     assert extras["last_resort"]["mean_value_vertices"] == 0
-    assert abs(uv - own).max() < 4 * LEAST_ARC
+    assert abs(uv - own).max() < 4 * MIN_ARC
 
 
 def test_a_map_whose_patches_cannot_be_laid_out_becomes_convex_near_its_folds():

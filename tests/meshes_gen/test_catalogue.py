@@ -20,7 +20,7 @@ from cembench.conformal.metrics import flipped_triangles
 from cembench.core.errors import ParameterError, RegistryError
 from cembench.core.notices import NoticeKind
 from cembench.mesh.triangle_mesh import DiskMesh
-from cembench.registry import MOST_FACES, load_registry
+from cembench.registry import MAX_FACES, load_registry
 from cembench.report.surface_facts import factor_spans, row_check
 from cembench.results.profiles import Profile, surfaces_of
 from cembench.running.plan import Provenance, mesh_facts
@@ -184,7 +184,7 @@ def test_no_family_makes_more_triangles_than_memory_holds() -> None:
     families = load_registry().surfaces
     made = [name for name in families if name != "ict-face"]  # the model has 28,068 at most
     for name in made:
-        families[name].arguments({"faces": MOST_FACES})
+        families[name].arguments({"faces": MAX_FACES})
         with pytest.raises(ParameterError, match="less than or equal to 4000000"):
             families[name].arguments({"faces": 10**9})
     assert len(made) > 20

@@ -59,7 +59,7 @@ def test_what_would_hang_or_fill_the_memory_is_refused(expression, said):
 
 
 def test_an_expression_has_so_many_seconds_of_the_processor(monkeypatch):
-    monkeypatch.setattr(expressions, "MOST_SECONDS", 0.05)
+    monkeypatch.setattr(expressions, "MAX_SECONDS", 0.05)
 
     def endless():
         while True:

@@ -258,7 +258,7 @@ def test_a_small_bundle_whose_text_is_huge_is_refused_before_it_is_read(bundles,
 
 
 def test_one_text_of_a_large_bundle_is_bounded_too(bundles, tmp_path, monkeypatch):
-    monkeypatch.setattr(bundle, "MOST_TEXT", 1000)
+    monkeypatch.setattr(bundle, "MAX_TEXT", 1000)
     said = refused(bundles / "node-2.zip")
     assert "'records/" in said or f"'{CRATE}'" in said
     assert "bytes, of at most 1,000" in said
@@ -302,16 +302,16 @@ def test_names_that_lead_elsewhere_are_refused_and_nothing_is_unpacked(tmp_path,
 
 def test_bombs_and_twins_and_encryption_are_refused(tmp_path, monkeypatch):
     path = tmp_path / "a.zip"
-    monkeypatch.setattr(bundle, "MOST_BYTES", 10_000)
+    monkeypatch.setattr(bundle, "MAX_BYTES", 10_000)
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("records/a.json", bytes(20_000))
     assert "its files have 20,000 bytes, of at most 10,000" in refused(path)
-    monkeypatch.setattr(bundle, "MOST_FILES", 1)
+    monkeypatch.setattr(bundle, "MAX_FILES", 1)
     with zipfile.ZipFile(path, "w") as archive:
         for name in ("records/a.json", "records/b.json"):
             archive.writestr(name, "x")
     assert "it holds 2 files, of at most 1" in refused(path)
-    monkeypatch.setattr(bundle, "MOST_FILES", 10)
+    monkeypatch.setattr(bundle, "MAX_FILES", 10)
     with zipfile.ZipFile(path, "w") as archive:
         for name in ("records/a.json", "records/A.json"):
             archive.writestr(name, "x")
@@ -333,7 +333,7 @@ def test_a_bomb_within_an_archive_of_arrays_is_refused(bundles, tmp_path, monkey
         files[name] = content.getvalue()
 
     path = rewritten(bundles / "node-2.zip", tmp_path / "a.zip", zeros)
-    monkeypatch.setattr(bundle, "MOST_BYTES", 10_000_000)
+    monkeypatch.setattr(bundle, "MAX_BYTES", 10_000_000)
     assert "declares 32,000,128 bytes, of at most 10,000,000" in refused(path)
 
 

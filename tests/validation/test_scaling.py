@@ -7,7 +7,7 @@ from benchmarks import noise
 from benchmarks.growth import simulate
 from cembench.core.errors import ParameterError
 from cembench.validation.scaling import (
-    MOST_ROUNDS,
+    MAX_ROUNDS,
     answer_of,
     growth_of,
     largest_two,
@@ -141,7 +141,7 @@ def test_rounds_are_added_until_the_answer_is_clear_or_time_is_used_up():
     # Slow: what looks fine is left without an interval, and what looks too steep gets one.
     assert more_rounds(two, 0, 60.0) == 0
     assert more_rounds(found(2.0, slower=[1.0, 1.0]), inf, 60.0) == 5
-    last = found(1.75, slower=[0.8, 1.2] * (MOST_ROUNDS // 2))
+    last = found(1.75, slower=[0.8, 1.2] * (MAX_ROUNDS // 2))
     assert (last.answer, more_rounds(last, 0, 0.0)) == ("inconclusive", 0)
     assert seconds_a_round(power("ours", 1.0)) > 0
 

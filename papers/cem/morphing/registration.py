@@ -39,13 +39,13 @@ LARGEST_REACH = 0.15
 #: Tolerance for landmarks at their targets, in units of the unit disk's radius.
 NEAR = 2e-3
 #: Maximum number of steps, and of reductions of lambda within a step.
-MOST_STEPS, MOST_TRIES = 40, 8
+MAX_STEPS, MAX_TRIES = 40, 8
 #: Share of the distance to the first fold that a step takes.
 CAUTION = 0.7
 #: Approximate capacity of a landmark's disk in the unit disk; used only to choose lambdas.
 CAPACITY = 2.0
 #: Least progress: a landmark's movement as a share of its distance to the next one.
-LEAST_STEP = 0.02
+MIN_STEP = 0.02
 
 
 @dataclass(frozen=True)
@@ -110,7 +110,7 @@ def register(
         return Registration(uv, (lam,), _error(uv, landmarks, targets))
     z, exponent = radially_stretched(mesh, start, landmarks, targets)
     lambdas = []
-    for _ in range(MOST_STEPS):
+    for _ in range(MAX_STEPS):
         at = z[landmarks]
         with phase("laplacian"):
             L = cotangent_laplacian(np.stack([z.real, z.imag], axis=1), mesh.F)
@@ -119,7 +119,7 @@ def register(
         error = _error(z, landmarks, targets)
         if used == lam or error <= NEAR:
             return Registration(z, tuple(lambdas), error, exponent)
-        if (np.abs(z[landmarks] - at) < LEAST_STEP * _room(at)).all():
+        if (np.abs(z[landmarks] - at) < MIN_STEP * _room(at)).all():
             break
     raise AlgorithmFailed(
         f"{mesh.name}: after {len(lambdas)} steps with lambda down to {min(lambdas):.2g} a "
@@ -210,7 +210,7 @@ def _step(
     The share up to the first fold determines the next lambda to try.
     """
     tried = lam
-    for _ in range(MOST_TRIES):
+    for _ in range(MAX_TRIES):
         new = minimiser(tried)
         share = first_fold(z, new, F)
         if share > 1:
@@ -243,7 +243,7 @@ def radially_stretched(
         return z, 1.0
     k = float(wanted_radii @ own_radii / (own_radii @ own_radii))
     modulus = np.maximum(np.abs(z), 1e-300)
-    for _ in range(MOST_TRIES):
+    for _ in range(MAX_TRIES):
         new = z * modulus ** (k - 1)
         if (signed_areas(new, mesh.F) > 0).all():
             return new, k
