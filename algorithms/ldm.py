@@ -85,7 +85,6 @@ def map_numbered(
         regular.
     delaunay, repair : bool
         As for `ldm`.
-
     """
     L, double, L_double, V = doubled_surface(mesh, delaunay=delaunay)
     z = balanced_planar_map(L_double, V, np.roll(double.F, mesh.m if mirrored else 0, axis=0))

@@ -69,7 +69,6 @@ def read_scan(file: Path) -> tuple[DiskMesh, Landmarks]:
     ------
     ParameterError
         The file has no landmarks, or one of them is not a vertex.
-
     """
     mesh = read_mesh(file, arrays=("V", "F"))
     marked = np.asarray(scipy.io.loadmat(file).get("landmark", ())).ravel().astype(np.int64) - 1

@@ -216,7 +216,6 @@ def record(made: str, start: str, command: str, seconds: float | None, commit: s
         How long that took, if it is known.
     commit : str
         The commit it was made at, if not the present one.
-
     """
     about = {
         "commit": commit or _head(),

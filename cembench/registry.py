@@ -85,7 +85,6 @@ class Parameter:
         ------
         ParameterError
             The value has the wrong type or is outside the declared range.
-
         """
         try:
             parsed = self._type.validate_python(value)
@@ -124,7 +123,6 @@ class _Registered:
         ------
         ParameterError
             A name is unknown, or :meth:`Parameter.parse` refuses a value.
-
         """
         known = {p.name: p for p in self.parameters}
         for name in values:
@@ -246,7 +244,6 @@ def algorithm(
     ...     "Map a disk with the boundary spaced by arc length."
     ...     circle = arc_length_circle(mesh)
     ...     return Parameterization(harmonic_extension(laplacian(mesh), mesh.boundary, circle))
-
     """
     place = _place(sys._getframe(1))
     about = {
@@ -316,7 +313,6 @@ def external_program(
     >>> @external_program("mine", title="Mine", target="disk", command="mine {input} {output}")
     ... def mine(mesh: DiskMesh) -> None:
     ...     "Map a disk with the program `mine`."
-
     """
     place = _place(sys._getframe(1))
     folder = place[1].parent if place[1] else Path.cwd()
@@ -346,7 +342,6 @@ def program_from(declared: Mapping[str, Any], folder: Path) -> Algorithm:
     ------
     RegistryError
         The declaration is invalid.
-
     """
     settings = dict(declared)
     command, name, target = (settings.pop(key, "") for key in ("command", "name", "target"))
@@ -514,7 +509,6 @@ def surface_family(
     ...     "A unit square in the plane z = 0."
     ...     V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     ...     return DiskMesh(V, [[0, 1, 2], [0, 2, 3]])
-
     """
     place = _place(sys._getframe(1))
 
@@ -703,7 +697,6 @@ def load_registry(plugins: Iterable[str] = ()) -> Registry:
     ------
     RegistryError
         A name is declared twice, or a plug-in cannot be imported or declares nothing.
-
     """
     installed = _installed()
     algorithms: ChainMap[str, Algorithm] = ChainMap({}, installed.algorithms)  # type: ignore[arg-type]  # only the first is written

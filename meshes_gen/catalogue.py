@@ -86,7 +86,6 @@ def stand_in(
         The name is unknown; the message lists the known names.
     MeshError
         There are so few triangles that the surface is not a disk.
-
     """
     if name not in ROWS:
         raise RegistryError(f"unknown stand-in {name!r}; known: {', '.join(ROWS)}.")
@@ -138,7 +137,6 @@ def landmarks(name: str, mesh: TriangleMesh) -> dict[str, int]:
     ------
     RegistryError
         The name is not that of a face.
-
     """
     if name not in FACES:
         raise RegistryError(f"{name!r} has no landmarks; the faces are: {', '.join(FACES)}.")

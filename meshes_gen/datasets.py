@@ -55,7 +55,6 @@ def read_datasets(file: Path) -> list[Dataset]:
     ------
     RegistryError
         A column or a cell is missing, or a number is none.
-
     """
     lines = file.read_text(encoding="utf-8").splitlines()
     try:

@@ -78,7 +78,6 @@ class Triangulation:
         The model's vertex that each vertex is.
     F : int64 (m, 3)
         Triangles.
-
     """
 
     kept: Indices
@@ -154,7 +153,6 @@ def sample(model: FaceModel, seed: int, expression: str = "neutral") -> Real:
     ------
     ParameterError
         The expression is unknown or not available, or a weight is not between 0 and 1.
-
     """
     coefficients = np.random.default_rng([seed, 0]).standard_normal(len(IDENTITIES))
     V = model.V.copy()
@@ -173,7 +171,6 @@ def expression_weights(model: FaceModel, expression: str, seed: int = 0) -> dict
     ------
     ParameterError
         The expression is unknown or not available, or a weight is not between 0 and 1.
-
     """
     if expression == "neutral":
         return {}
@@ -223,7 +220,6 @@ def triangulation(part: str, faces: int) -> Triangulation:
     ------
     MissingExtra
         pymeshlab, which decimates, is not installed.
-
     """
     extent, model = PARTS[part], load_model()
     sizes = model.sizes[: extent.polygons]

@@ -61,7 +61,6 @@ class FaceModel:
         Its polygons, as in a :class:`cembench.mesh.soup.Soup`.
     identities, expressions : mapping of str to float64 (14062, 3)
         Displacement for a coefficient of 1; only modes whose files are available.
-
     """
 
     V: Real
@@ -83,7 +82,6 @@ def load_model() -> FaceModel:
     ------
     DatasetError
         The neutral face or all identities are missing, or a file is damaged.
-
     """
     folder = model_folder()
     there = sorted((p.name, p.stat().st_mtime_ns) for p in folder.glob("*.[no][pb][zj]"))
@@ -147,7 +145,6 @@ def small_arrays(published: Path) -> bytes:
     ------
     DatasetError
         The file is not part of the model, or is incomplete.
-
     """
     try:
         soup = obj.read(published)

@@ -37,7 +37,6 @@ class Body:
         Cells of the first sampling grid along the longest side of the box.
     loops : int
         Boundary loops that the cut leaves: 1 for a disk, more for a surface with holes.
-
     """
 
     f: Field

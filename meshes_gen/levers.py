@@ -71,7 +71,6 @@ class Levers:
         the centre when the middle triangle's image is there. This decides how CEM starts (Eq. 15).
     cut : float
         How far the cut moves into the body, as a share of its longest side.
-
     """
 
     jag: float = 0.0

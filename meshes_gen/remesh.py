@@ -459,7 +459,6 @@ def mesh_of(
     ------
     MeshError
         The surface has the wrong topology: there are too few triangles for its features.
-
     """
     use = has_remeshing_filter() if use_pymeshlab is None else use_pymeshlab
     V, F, body, spacing = march(body)

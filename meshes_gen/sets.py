@@ -73,7 +73,6 @@ def surfaces_of_thingi10k(
     ------
     ParameterError
         The package is not installed, or cannot fetch the set.
-
     """
     try:
         thingi10k = importlib.import_module("thingi10k")

@@ -118,7 +118,6 @@ def exact_map(faces: int, aspect: float) -> Complex:
     ------
     ParameterError
         The elliptic functions lose their digits at this aspect.
-
     """
     if not 0.2 <= aspect <= 20:
         raise ParameterError(

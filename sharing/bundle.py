@@ -101,7 +101,6 @@ def pack(
     ------
     RecordError
         A collection would refuse it.
-
     """
     files = _contents(run, surfaces if maps else None)
     about = {"name": path.stem, "licence": licence, "author": author}
@@ -304,7 +303,6 @@ def _checked(name: str, path: Path, folder: Path) -> tuple[Submission, Sequence[
     ------
     RecordError
         It is no bundle, or holds what must not be unpacked: nothing is then.
-
     """
     again = "Ask its sender to pack it again, with `cembench submit`, or leave it out."
     try:
@@ -407,7 +405,6 @@ def implausible(record: Record, hardware_threads: int | None = None) -> Iterator
         The record of a cell.
     hardware_threads : int, optional
         Those of its machine.
-
     """
     try:
         started = datetime.fromisoformat(record.started_at)

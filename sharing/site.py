@@ -104,7 +104,6 @@ def write_site(
         No run, or the same one twice.
     RecordError
         A folder holds no run, or the site's folder holds other files.
-
     """
     places = [run.resolve() for run in runs]
     if not places or len(set(places)) < len(places):
@@ -182,7 +181,6 @@ def history(runs: Sequence[PublishedRun]) -> dict[str, list[HeadlineRatio | None
     --------
     >>> history([])
     {}
-
     """
     by_series: dict[str, list[HeadlineRatio | None]] = {}
     for name in sorted({name for run in runs for name in run.ratios}):

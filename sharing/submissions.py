@@ -51,7 +51,6 @@ class Submission:
     >>> from cembench import Submission
     >>> Submission("mine", faults=("it holds no record",)).accepted
     False
-
     """
 
     name: str
@@ -123,7 +122,6 @@ def submit(
     >>> sent = cembench.submit("results/run", "mine.zip", maps=True)  # doctest: +SKIP
     >>> sent.accepted, sent.cells  # doctest: +SKIP
     (True, 24)
-
     """
     from cembench.core.overwriting import refuse_present
     from cembench.results.store import Store
@@ -200,7 +198,6 @@ def check_submissions(
     >>> import cembench
     >>> for one in cembench.check_submissions("submissions"):  # doctest: +SKIP
     ...     print(one.name, one.accepted, *one.faults)
-
     """
     from .bundle import bundles_in, unpacked
 
@@ -249,7 +246,6 @@ def publish(
     --------
     >>> import cembench
     >>> cembench.publish(["results/may", "submissions"], "site")  # doctest: +SKIP
-
     """
     from cembench.core.overwriting import refuse_inputs
     from cembench.results.signing import signers_of
@@ -303,7 +299,6 @@ def sign(run: AnyPath, key: AnyPath) -> Path:
     --------
     >>> import cembench
     >>> cembench.sign("results/run", "~/.ssh/id_ed25519")  # doctest: +SKIP
-
     """
     from cembench.results import signing
 

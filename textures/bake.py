@@ -26,7 +26,6 @@ def read_texture(path: Path) -> Image.Image:
     ------
     RenderError
         The file is missing or is not a picture.
-
     """
     try:
         with Image.open(path) as picture:
@@ -56,7 +55,6 @@ def baked_png(texture: Image.Image, old: Real, new: Real) -> bytes:
     -------
     bytes
         A square PNG file whose side is the old texture's longer side (at most :data:`LONGEST`).
-
     """
     side = min(max(texture.size), LONGEST)
     window = np.concatenate([2 * new - 1, np.zeros((*new.shape[:2], 1))], axis=2)
@@ -113,7 +111,6 @@ def uv_of_faces(path: Path, F: Indices) -> Points:
     ------
     MeshError
         The file is not OBJ, or some corners have no texture coordinates.
-
     """
     if path.suffix.lower() != ".obj":
         raise MeshError(

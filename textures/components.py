@@ -49,7 +49,6 @@ class Shells:
         Vertex numbers of each shell in the whole file.
     faces : tuple of int64 (m_i,)
         Triangle numbers of each shell in the whole file.
-
     """
 
     path: Path
@@ -70,7 +69,6 @@ class Shells:
             Entry i is the image of vertex i; further entries are copies made by cuts.
         corners : int64 (m, 3), optional
             The entry of each corner, if surfaces were cut.
-
         """
         uv, copies = np.zeros(len(self.V), np.complex128), []
         corners, size = self.F.copy(), len(self.V)
@@ -101,7 +99,6 @@ def read_shells(
     ------
     MeshError
         The file cannot be read, or one of its surfaces is not of such a kind.
-
     """
     kinds, name = kinds_of(algorithms), str(path)
     generated = is_generated(name, registry)

@@ -31,7 +31,6 @@ def write_geometry_image(path: Path, mesh: TriangleMesh, samples: Real) -> None:
         The format is unknown.
     RenderError
         The file cannot be written, or OpenEXR is not installed.
-
     """
     check_image_format(path)
     if path.suffix.lower() == ".exr":

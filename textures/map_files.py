@@ -161,7 +161,6 @@ def map_files(
     >>> (mapped,) = cembench.map_files(["flat.obj"], output="flat_uv.obj")
     >>> mapped.ok, mapped.written["output"]
     (True, 'flat_uv.obj')
-
     """
     from os import PathLike
     from pathlib import Path

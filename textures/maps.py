@@ -41,7 +41,6 @@ class FileJobs:
         File for the surfaces with their maps.
     picture : Path, optional
         File for a picture of them.
-
     """
 
     shells: Shells
@@ -87,7 +86,6 @@ class Maps:
         The surfaces mapped so far.
     missing : list of Path
         Files that were not written because a map is missing.
-
     """
 
     files: Sequence[FileJobs]

@@ -30,7 +30,6 @@ def geometry_image(result: Result, side: Side = 257) -> Real:
     float64 (side, side, 3)
         Points of the surface. A map onto the disk is sampled on the square, any other in place, see
         :func:`cembench.textures.resample.geometry_image`.
-
     """
     onto_disk = resample.off_the_circle(result.mesh, result.z) <= resample.ON_CIRCLE
     grid: resample.Grid = "square" if onto_disk else "disk"
@@ -52,7 +51,6 @@ def remesh(result: Result, side: Side = 65) -> DiskMesh:
     -------
     DiskMesh
         The new mesh.
-
     """
     return resample.regular_remesh(result.mesh, result.z, side)[0]
 
@@ -80,7 +78,6 @@ def bake(result: Result, texture: AnyPath, source: AnyPath) -> bytes:
         The picture cannot be read.
     MeshError
         The file is not OBJ, has no UVs, or other faces.
-
     """
     from .bake import baked_png, read_texture, uv_of_faces
 

@@ -125,7 +125,6 @@ def output_files(meshes: Sequence[Path], output: Path | None) -> list[Path | Non
         The format cannot hold UVs, or the folder does not exist.
     ParameterError
         Two surfaces have the same name.
-
     """
     if output is None:
         return [None] * len(meshes)

@@ -37,7 +37,6 @@ def packed(
     -------
     list of complex128 (n,)
         The maps in the given order, without overlap.
-
     """
     if len(maps) == 1:
         return [to_unit_square(maps[0])]

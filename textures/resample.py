@@ -57,7 +57,6 @@ def geometry_image(mesh: TriangleMesh, z: Complex, side: Side, grid: Grid = "squ
     References
     ----------
     .. [1] X. Gu, S. Gortler, H. Hoppe, "Geometry images", SIGGRAPH 2002.
-
     """
     if grid == "square":
         _check_disk(mesh, z)
@@ -104,7 +103,6 @@ def regular_remesh(mesh: TriangleMesh, z: Complex, side: Side) -> tuple[DiskMesh
     ------
     ParameterError
         The side is out of range or too large for the surface, or the map is not onto the disk.
-
     """
     _check_disk(mesh, z)
     step = 2 / (side - 1)

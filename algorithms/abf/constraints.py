@@ -93,7 +93,6 @@ class Angles:
         ------
         AlgorithmFailed
             The constraints are dependent up to rounding.
-
         """
         triangle, vertex, wheel = self.residuals(angles)
         with phase("assembly"):

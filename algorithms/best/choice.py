@@ -35,7 +35,6 @@ class Candidate:
         The algorithm.
     cost : float
         About how many times as long it takes as the first candidate.
-
     """
 
     call: Callable[..., Parameterization]
@@ -81,7 +80,6 @@ def best_of(
     ------
     AlgorithmFailed
         No candidate has a map.
-
     """
     surface = MapFigures(mesh, np.zeros(mesh.n, dtype=np.complex128))
     tried: dict[str, dict[str, float] | str] = {}

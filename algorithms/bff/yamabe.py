@@ -31,7 +31,6 @@ class YamabeBoundary:
         From each boundary vertex to the next on the surface.
     natural : float (B,)
         Exterior angles k~ in radians if the boundary keeps its scale, u = 0; their sum is 2 pi.
-
     """
 
     def __init__(self, mesh: DiskMesh, *, delaunay: bool) -> None:

@@ -35,7 +35,6 @@ class Crossings:
         The triangulation, by half-edges (3 m).
     edge, sign : lists of int
         Each half-edge's edge, and 1 if it runs the same way, else -1.
-
     """
 
     F: list[int]
@@ -89,7 +88,6 @@ class Crossings:
         ------
         AlgorithmFailed
             The paths cross the edges too often.
-
         """
         most = MOST + MAX_OF_AN_EDGE * len(self.on_edge)
         for some in rounds:

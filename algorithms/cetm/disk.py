@@ -119,7 +119,6 @@ def _checked_ear(mesh: DiskMesh) -> int | None:
     ------
     AlgorithmFailed
         There are other chords.
-
     """
     on = np.zeros(mesh.n, dtype=bool)
     on[mesh.boundary] = True

@@ -60,7 +60,6 @@ class FlatMetric:
         In radians.
     history : tuple of float
         The largest error of an angle sum, in radians, at the start and after each step.
-
     """
 
     u: Real
@@ -111,7 +110,6 @@ def flat_metric(
     AlgorithmFailed
         No vertex is free; the residual is above `tolerance` after `max_iterations`; or triangles
         are broken at the minimum, so that the triangulation has no such metric.
-
     """
     n = len(u)
     kept = np.ones(n, dtype=bool)

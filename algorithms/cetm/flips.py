@@ -120,7 +120,6 @@ class Uniformised:
         Newton steps.
     told : dict
         Further results of cetm-flips.
-
     """
 
     T: Triangulation
@@ -145,7 +144,6 @@ def uniformised(
     ------
     AlgorithmFailed
         Newton's method or the layout fails.
-
     """
     b = mesh.boundary
     cones = _cones(mesh, BorderedLaplacian(mesh, laplacian(mesh, delaunay=True), (b,)))

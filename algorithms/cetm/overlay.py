@@ -54,7 +54,6 @@ class RefinedMap:
     extras : dict
         What :func:`cembench.algorithms.cetm.flips.cetm_flips` tells; `folded_before_repair` counts
         triangles of the refined mesh.
-
     """
 
     mesh: DiskMesh
@@ -103,7 +102,6 @@ def refined_map(
     >>> found = refined_map(disk)
     >>> found.mesh.n >= disk.n, flipped_triangles(found.mesh, found.uv)
     (True, 0)
-
     """
     watched: list[Triangulation] = []
 

@@ -47,7 +47,6 @@ def gauge_walk(
         The map.
     energies : tuple of float
         E_C after each step taken.
-
     """
     uv, error = extended(here.domain.points), None
     energies: tuple[float, ...] = ()

@@ -70,7 +70,6 @@ def valid_with_holes(
     extras : dict
         As for :func:`cembench.conformal.fold_repair.accepted_repair`. If the opened disk is the
         map, ``last_resort`` has ``opened_holes``, their number.
-
     """
     with phase("folds"):
         folded = flipped_triangles(mesh, own)
@@ -118,7 +117,6 @@ def opened_disk(mesh: HoledMesh, holes: Sequence[Loop]) -> Complex:
     >>> z = opened_disk(ring, ring.outer_and_holes()[1])
     >>> flipped_triangles(ring, z)
     0
-
     """
     disk = direct_cem(filled(mesh, holes)).uv
     of = _holes_of(mesh, holes)

@@ -58,7 +58,6 @@ class KoebeStep:
         Number of CEM steps that were changed to keep the boundary's order.
     surface : BorderedLaplacian
         The surface with its own weights, factored.
-
     """
 
     sweep: int
@@ -91,7 +90,6 @@ def koebe_steps(
         There is nothing to map, or an image has collapsed.
     ParameterError
         `outer` names no boundary.
-
     """
     first, holes = mesh.outer_and_holes(outer)
     loops = (first, *holes)
@@ -145,7 +143,6 @@ def finished(
     ------
     AlgorithmFailed
         A hole is too far from a circle.
-
     """
     uv = step.uv
     if rounding:

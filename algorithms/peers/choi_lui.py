@@ -34,7 +34,6 @@ def matlab_program(name: str, function: str, where: str, **about: Any) -> Callab
         The algorithm's name, the usual name of the function, and where the program is published.
     **about
         As for :func:`cembench.registry.external_program`.
-
     """
     variable = f"CEMBENCH_{name.upper().replace('-', '_')}"
     remedy = (

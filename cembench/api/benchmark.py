@@ -69,7 +69,6 @@ class Run:
     >>> import cembench
     >>> cembench.Run(Path("results/run")).folder.name
     'run'
-
     """
 
     folder: Path
@@ -88,7 +87,6 @@ class Run:
         ------
         RecordError
             The folder is not a run, or one of its records is damaged.
-
         """
         from cembench.results.store import Store
 
@@ -112,7 +110,6 @@ class Run:
             boundary is free), mean angle error in degrees, and folds. The
             linear-algebra policy is a column if there are several. Numbers are rounded as on a
             terminal.
-
         """
         import pandas as pd
 
@@ -139,7 +136,6 @@ class Run:
         -------
         list of dict
             The rows.
-
         """
         from cembench.results.columns import rows
 
@@ -158,7 +154,6 @@ class Run:
         pandas.DataFrame
             One row per surface, algorithm and policy, with the interval from paired rounds and
             who is faster than whom; empty if the reference was not measured.
-
         """
         columns = ["surface", "algorithm", "solves", "speedup", "speedup_low", "speedup_high"]
         table = self.table(reference, full=True)
@@ -223,7 +218,6 @@ class Run:
             checks.py and is not trusted.
         RegistryError
             There is no such paper.
-
         """
         from cembench.report.write_report import write_report
         from cembench.results.papers import find_paper
@@ -263,7 +257,6 @@ class Run:
         ------
         RecordError
             There is no such folder.
-
         """
         from cembench.api.run_status import status_of
 
@@ -286,7 +279,6 @@ class Run:
         ------
         RecordError
             There is no run, no such cell, or its contents disagree.
-
         """
         from cembench.core.errors import RecordError
         from cembench.results.store import Store
@@ -331,7 +323,6 @@ class Run:
             The file is one of the run's own.
         RecordError
             There is no run, or its contents disagree.
-
         """
         from cembench.report.export import export_rows
         from cembench.results.columns import rows
@@ -514,7 +505,6 @@ def benchmark(
     >>> run = cembench.benchmark(["flat-disk"], ["harmonic-circle"], rounds=1)
     >>> [record.outcome.status for record in run.records()]
     ['ok']
-
     """
     asked = locals()
     from cembench.api.run_plan import Sources, check_cluster, plan

@@ -38,7 +38,6 @@ class Catalogue:
     >>> import cembench
     >>> sorted(cembench.catalogue("algorithms").as_dict())
     ['algorithms']
-
     """
 
     algorithms: tuple[Algorithm, ...] | None
@@ -53,7 +52,6 @@ class Catalogue:
         -------
         dict
             Algorithms and surfaces, each as a list with a dictionary for each.
-
         """
         listed: dict[str, Any] = {}
         if self.algorithms is not None:
@@ -132,7 +130,6 @@ def catalogue(
     >>> import cembench
     >>> "cem" in [algorithm.name for algorithm in cembench.catalogue().algorithms]
     True
-
     """
     if measure and kind != "surfaces":
         raise ParameterError("`measure` is only for surfaces: leave it out, or list surfaces only.")
@@ -179,7 +176,6 @@ def list_algorithms(plugins: Iterable[str] = ()) -> list[Algorithm]:
     >>> import cembench
     >>> "cem" in [algorithm.name for algorithm in cembench.list_algorithms()]
     True
-
     """
     from cembench.registry import load_registry
 
@@ -204,7 +200,6 @@ def list_surfaces(plugins: Iterable[str] = ()) -> list[Surface]:
     >>> import cembench
     >>> "spherical-cap" in [family.name for family in cembench.list_surfaces()]
     True
-
     """
     from cembench.registry import load_registry
 
@@ -242,7 +237,6 @@ def surface(name: str, faces: int | None = None, **parameters: Any) -> TriangleM
     >>> import cembench
     >>> cembench.surface("flat-disk", 200).name
     'flat-disk'
-
     """
     from cembench.registry import load_registry
 

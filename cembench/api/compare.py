@@ -66,7 +66,6 @@ class VersionsCompared:
     >>> run = cembench.Run("results/run")
     >>> cembench.VersionsCompared(run, ("old", "new"), (), ()).versions
     ('old', 'new')
-
     """
 
     run: Run
@@ -95,7 +94,6 @@ class VersionsCompared:
             One of them is unknown.
         RecordError
             There was no valid map before.
-
         """
         from cembench.results.regressions import regressions
 
@@ -184,7 +182,6 @@ def compare_versions(
     ... )
     >>> found.regressions(["worse", "invalid"])
     []
-
     """
     from cembench.api.benchmark import benchmark
     from cembench.results.profiles import Profile
@@ -308,7 +305,6 @@ def _commit(ref: str) -> str:
     ------
     ParameterError
         There is no repository, or no such commit.
-
     """
     try:
         _git("rev-parse", "--git-dir")

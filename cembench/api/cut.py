@@ -65,7 +65,6 @@ def cut(
     >>> octahedron = cembench.cut((V, F), through=[2, 5])
     >>> octahedron.mesh.n, len(octahedron.mesh.boundary), len(octahedron.edges)
     (7, 4, 2)
-
     """
     from cembench.mesh.cut import cut_along, cut_open, edges_of_paths, edges_of_uv_seams
     from cembench.mesh.defects import located

@@ -65,7 +65,6 @@ def doctor() -> list[InstallationFinding]:
     >>> import cembench
     >>> [one.name for one in cembench.doctor() if one.required and not one.ok]
     []
-
     """
     return [
         _python(),

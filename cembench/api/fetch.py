@@ -37,7 +37,6 @@ class PublicSurfaces(dict[str, Path]):
     >>> surfaces = cembench.fetch()
     >>> next(row["licence"] for row in surfaces.rows if row["name"] == "left-hand")
     'Apache-2.0'
-
     """
 
     def __init__(
@@ -104,7 +103,6 @@ def fetch(
     >>> import cembench
     >>> cembench.fetch("left-hand")["left-hand"]  # doctest: +SKIP
     PosixPath('/home/me/.cache/cembench/left-hand.mat')
-
     """
     from contextlib import closing
 
@@ -171,7 +169,6 @@ def local_files(
     ------
     MeshError
         A name is that of no surface.
-
     """
     from cembench.mesh import datasets
     from cembench.running.surfaces import file_named, is_generated

@@ -58,7 +58,6 @@ def measure(
     (1, 0)
     >>> round(found.metrics["symmetric_dirichlet"], 9)
     4.0
-
     """
     from cembench.api.measurement import measured
 

@@ -55,7 +55,6 @@ class Best:
         the surface.
     share : float
         Share of the surface that was mapped.
-
     """
 
     angle_error_mean_deg: float
@@ -92,7 +91,6 @@ class Measurement:
     >>> mesh = cembench.surface("flat-disk", 400)
     >>> cembench.measure(mesh, mesh.V[:, :2] / 4 + 0.5).verdict[:24]
     '1 island, mean angle err'
-
     """
 
     mesh: TriangleMesh

@@ -37,7 +37,6 @@ class MergedRuns:
     >>> run = cembench.benchmark(["flat-disk"], ["lscm"], faces=200, rounds=1, output="first")
     >>> cembench.merge(["first"], "all").cells
     1
-
     """
 
     output: Path
@@ -103,7 +102,6 @@ def merge(
     ...     )
     >>> cembench.merge(["run-1", "run-2"], "both").cells
     2
-
     """
     from cembench.core.overwriting import refuse_inputs
     from cembench.results import merging

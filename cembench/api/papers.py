@@ -34,7 +34,6 @@ def check_paper(folder: AnyPath) -> list[str]:
     >>> import cembench
     >>> cembench.check_paper("cem")
     []
-
     """
     from cembench.core.errors import RegistryError
     from cembench.registry import load_registry

@@ -66,7 +66,6 @@ class Result:
     (True, True)
     >>> result.save("flat.obj").name
     'flat.obj'
-
     """
 
     mesh: TriangleMesh
@@ -166,7 +165,6 @@ class Result:
             replaced. No partial file is left.
         ParameterError
             `uv` is unknown, or "square" for a map that is no disk.
-
         """
         from cembench.api.save_map import save_map, texture_files
         from cembench.core.overwriting import refuse_present
@@ -215,7 +213,6 @@ class Result:
         >>> proof = result.certificate()
         >>> proof.encloses(result.z[proof.corners])
         True
-
         """
         from cembench.conformal.certificate import certificate_of
 
@@ -254,7 +251,6 @@ class Result:
         ------
         ParameterError
             The path does not end in .png.
-
         """
         import io
 
@@ -302,7 +298,6 @@ class Result:
             The page cannot be written.
         ParameterError
             The path does not end in .html.
-
         """
         import tempfile
         import webbrowser
@@ -441,7 +436,6 @@ def parameterize(
     0
     >>> cembench.parameterize(mesh, "cem").algorithm.name
     'cem'
-
     """
     if check not in get_args(Check):
         allowed = ", ".join(map(repr, get_args(Check)))

@@ -79,7 +79,6 @@ def parameterize_many(
     >>> disks = (cembench.surface("cone", faces) for faces in (100, 200))
     >>> [result.ok for result in cembench.parameterize_many(disks)]
     [True, True]
-
     """
     if jobs < 1:
         raise ParameterError(f"jobs={jobs} is not allowed; allowed is 1 or more.")

@@ -47,7 +47,6 @@ class Repair:
     >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
     >>> len(cembench.repair("flat.obj").meshes)
     1
-
     """
 
     meshes: tuple[TriangleMesh, ...]
@@ -135,7 +134,6 @@ def repair(
     [0, 1, 2, 5]
     >>> type(mended.mesh).__name__
     'DiskMesh'
-
     """
     from cembench.mesh.defects import located
     from cembench.mesh.files import read_soup, repair_soup

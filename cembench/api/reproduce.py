@@ -40,7 +40,6 @@ class Reproduction:
     >>> found = cembench.reproduce(offline=True, budget=0)  # doctest: +SKIP
     >>> sorted(set(found.surfaces.values()))  # doctest: +SKIP
     ['stand-in']
-
     """
 
     run: Run
@@ -98,7 +97,6 @@ def reproduce(
     >>> import cembench
     >>> found = cembench.reproduce("results/paper", budget="10m")  # doctest: +SKIP
     >>> found.run.table()  # doctest: +SKIP
-
     """
     from cembench.core import folders
     from cembench.registry import load_registry

@@ -91,7 +91,6 @@ class Plan:
         Where they are measured; None: on this machine.
     exhibit : Exhibit, optional
         What is kept with the run of surfaces that come from sets.
-
     """
 
     tasks: Sequence[Task]

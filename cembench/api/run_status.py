@@ -47,7 +47,6 @@ class RunStatus:
     >>> run = cembench.benchmark(["flat-disk"], ["lscm"], faces=200, rounds=1)
     >>> [str(state) for _, state in run.status().cells]
     ['ok']
-
     """
 
     cells: tuple[tuple[Cell, CellState], ...]

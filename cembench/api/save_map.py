@@ -54,7 +54,6 @@ def texture_files(output: Path) -> list[Path]:
     ------
     ParameterError
         The format cannot refer to a texture.
-
     """
     suffix = output.suffix.lower()
     texture = output.with_name(f"{output.stem}_texture.png")
@@ -110,7 +109,6 @@ def placed(z: Complex, place: Placement, surface: TriangleMesh, F: Indices) -> C
     ------
     ParameterError
         A map that does not reach the unit circle should be put on a square.
-
     """
     if place == "unit":
         return to_unit_square(z)

@@ -93,7 +93,6 @@ def surfaces_of_set(
     >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
     >>> [one.name for one in surfaces_of_set(".", load_registry())]
     ['flat']
-
     """
     if name == CORPUS:
         name = os.environ.get(CORPUS_VARIABLE) or name
@@ -149,7 +148,6 @@ class Gathered:
         The other surfaces, each with the reason.
     roles : mapping
         Where each of them is from, by its name.
-
     """
 
     surfaces: tuple[Provided, ...]

@@ -58,7 +58,6 @@ def precision_share(precision: float | str) -> float:
     ------
     ParameterError
         It is not a share, or is outside the range.
-
     """
     text = str(precision).strip()
     try:
@@ -80,7 +79,6 @@ def budget_seconds(budget: float | str | None) -> float | None:
     ------
     ParameterError
         It is not a time, or is outside the range.
-
     """
     if budget is None:
         return None
@@ -107,7 +105,6 @@ def bytes_of(memory_bytes: int | str | None) -> int:
     ------
     ParameterError
         It is not a size, or is outside the range.
-
     """
     import psutil
     from pydantic import ByteSize, TypeAdapter, ValidationError
@@ -159,7 +156,6 @@ def algorithms_named(name: str | None, target: MapTarget | None) -> tuple[str, .
     ------
     ParameterError
         Both are given, or the target is unknown.
-
     """
     if target is not None and target not in RECOMMENDED:
         allowed = ", ".join(map(repr, RECOMMENDED))

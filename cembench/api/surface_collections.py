@@ -65,7 +65,6 @@ class Provided:
         Whether it was closed and was cut open.
     provenance : Provenance
         What is known of who published it, and of the object that it shows.
-
     """
 
     name: str
@@ -100,7 +99,6 @@ def surfaces_of_folder(folder: Path, *, limit: int | None = None) -> Iterator[Pr
     >>> cembench.write_mesh("flat.obj", cembench.surface("flat-disk", 200))
     >>> [found.name for found in surfaces_of_folder(Path())]
     ['flat']
-
     """
     if not folder.is_dir():
         raise ParameterError(f"{folder} is not a folder; name a folder that holds mesh files.")
@@ -132,7 +130,6 @@ def read_manifest(folder: Path) -> dict[str, dict[str, str]]:
     ------
     ParameterError
         The manifest cannot be read.
-
     """
     place = folder / MANIFEST
     if not place.is_file():
@@ -168,7 +165,6 @@ def surfaces_of_archive(path: Path, *, limit: int | None = None) -> Iterator[Pro
     ------
     ParameterError
         The file is not an archive, or is damaged.
-
     """
     names = Names()
     with tempfile.TemporaryDirectory() as folder:

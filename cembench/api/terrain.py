@@ -42,7 +42,6 @@ def terrain(
     >>> hill = cembench.terrain(z, x=30.0, y=30.0)
     >>> hill.n, hill.m, hill.V[-1].tolist()
     (9, 8, [60.0, 60.0, 0.0])
-
     """
     from cembench.mesh.files import most_special
     from cembench.mesh.terrain import heights_of, soup_of_heights

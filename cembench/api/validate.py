@@ -97,7 +97,6 @@ def validate(
     >>> found = cembench.validate("harmonic-circle", checks_only=True)
     >>> found.algorithm, found.valid
     ('harmonic-circle', True)
-
     """
     from cembench.api.run_plan import read_surfaces
     from cembench.core import folders
@@ -166,7 +165,6 @@ def write_validation(validation: Validation, folder: Path) -> None:
     ------
     RecordError
         The folder cannot be written.
-
     """
     from cembench.core import folders
     from cembench.core.atomic import draft_folder, unwritable, write_model

@@ -28,7 +28,6 @@ def hours(
         ``seconds`` by number of machines; ``units``, how many there are; ``useful``, how many
         machines are of use at most; ``longest``, the surface whose unit takes longest, and its
         seconds.
-
     """
     from cembench.running.estimate import planned_seconds
     from cembench.running.plan import comparable_groups

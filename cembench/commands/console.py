@@ -226,7 +226,6 @@ def assignments(texts: Sequence[str]) -> dict[str, str]:
     ------
     ParameterError
         An assignment is not of that form.
-
     """
     pairs = {}
     for assignment in texts:

@@ -42,7 +42,6 @@ def declared_command(command: str | None, settings: list[str]) -> tuple[list[str
         A setting has no command, is unknown, or has the wrong type.
     RegistryError
         The declaration is inconsistent.
-
     """
     from cembench.registry import COMMAND, declared_by, load_registry
 

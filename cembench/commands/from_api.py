@@ -85,7 +85,6 @@ def from_api(
     callable
         A decorator of a function that takes the call and the arguments that only the shell has.
         One of these replaces the argument of that name.
-
     """
 
     def decorate(body: Callable[..., None]) -> Callable[..., None]:

@@ -58,7 +58,6 @@ def angle_gauge(mesh: DiskMesh, uv: Complex) -> Complex:
     >>> after = angle_gauge(mesh, before)
     >>> bool(angle_errors(mesh, after).mean() <= 1.01 * angle_errors(mesh, before).mean())
     True
-
     """
     from scipy.optimize import minimize  # a tenth of a second
 

@@ -54,7 +54,6 @@ def annulus_map(mesh: HoledMesh, outer: Loop, hole: Loop) -> Complex:
     >>> z = annulus_map(ring, outer, hole)
     >>> bool(np.ptp(np.abs(z[hole])) < 1e-12)
     True
-
     """
     ring = conjugate_functions(mesh, outer, [hole])
     u, v, b = ring.u[:, 0], ring.v[:, 0], np.concatenate([outer, hole])

@@ -45,7 +45,6 @@ class CutMap:
         folds and to keep the sign of angles.
     given : complex128 (k,)
         The images as they were given.
-
     """
 
     surface: TriangleMesh

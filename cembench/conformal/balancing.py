@@ -25,7 +25,6 @@ def moebius_centred(
     ------
     AlgorithmFailed
         The centre is not within `tolerance` of the origin after `max_iterations`.
-
     """
     share = mass / mass.sum()
     for _ in range(max_iterations):

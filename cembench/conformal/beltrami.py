@@ -149,7 +149,6 @@ def linear_beltrami_solver(
     ------
     AlgorithmFailed
         The weights are not finite, or the matrix is not positive definite.
-
     """
     bad = np.flatnonzero(~np.isfinite(weights).all(axis=1))
     if len(bad):

@@ -64,7 +64,6 @@ class BorderedLaplacian:
         The mesh has no interior vertex.
     NotPositiveDefinite
         L with its last vertex pinned is not positive definite.
-
     """
 
     def __init__(

@@ -30,7 +30,6 @@ def closed_curve(lengths: Real, turns: Real) -> tuple[Complex, float]:
     ------
     AlgorithmFailed
         An edge would have no positive length.
-
     """
     directions = np.exp(1j * np.concatenate([[0.0], np.cumsum(turns[1:])]))
     T = np.stack([directions.real, directions.imag])

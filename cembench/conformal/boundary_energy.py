@@ -65,7 +65,6 @@ class Minimum:
         Number of products with the Hessian.
     held_arcs : int
         Number of arcs that would have to become shorter than allowed to decrease E_C further.
-
     """
 
     model: EnergyModel
@@ -93,7 +92,6 @@ def minimise(
     ------
     AlgorithmFailed
         The gauge cannot be reached.
-
     """
     model = EnergyModel(S, in_gauge(start, weights), weights)
     energies, radius, products = [model.energy], 1.0, 0
@@ -183,7 +181,6 @@ def in_gauge(domain: CircleDomain, weights: Real) -> CircleDomain:
     ------
     AlgorithmFailed
         Newton's method does not converge: a single vertex has too much of the weight.
-
     """
     for _ in range(GAUGE_STEPS):
         a = _to_gauge(domain.points, weights)

@@ -61,7 +61,6 @@ def on_circle(f_b: Complex) -> Complex:
     ------
     AlgorithmFailed
         A vertex lies at the centre.
-
     """
     f_b = f_b - f_b.mean()
     modulus = np.abs(f_b)
@@ -123,7 +122,6 @@ def iterate_boundary(
         E_C at the start and after each step.
     order_kept : int
         Number of steps that were changed, or left out, to keep the boundary's order.
-
     """
 
     def step(f_i: Complex) -> Complex:

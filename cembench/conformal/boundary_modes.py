@@ -36,7 +36,6 @@ class InverseByModes:
         Harmonic measure from each vertex to the next, in radians; at least five vertices.
     L_bb : sparse (B, B)
         The boundary's rows and columns of the Laplacian.
-
     """
 
     def __init__(self, arcs: Real, L_bb: scipy.sparse.sparray) -> None:

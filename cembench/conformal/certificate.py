@@ -43,7 +43,6 @@ class Certificate:
         modulus.
     conjugate : float
         The same for the other two sides: an upper bound of the reciprocal modulus.
-
     """
 
     corners: Indices
@@ -116,7 +115,6 @@ class HolesCertificate:
     conjugate : float (k, k)
         Those of the conjugate functions, of period 1: a^T conjugate a >= a^T C^-1 a (Thomson's
         principle), so the inverse is a lower bound.
-
     """
 
     corners: Indices
@@ -142,7 +140,6 @@ class HolesCertificate:
         ------
         AlgorithmFailed
             The image of a hole is not a circle to :data:`ROUND`, or circles meet.
-
         """
         loops = np.split(z, np.cumsum(self.sizes)[:-1])
         centres, radii = map(np.array, zip(*map(fitted_circle, loops), strict=True))
@@ -216,7 +213,6 @@ def certificate_of(
     ------
     AlgorithmFailed
         The boundary has fewer than four vertices.
-
     """
     if target == "disk" and isinstance(mesh, DiskMesh):
         return certify(mesh)
@@ -238,7 +234,6 @@ def certify_holes(mesh: HoledMesh, outer: int | None = None) -> HolesCertificate
     >>> low, high = found.lower[0, 0], found.upper[0, 0]
     >>> bool(low < high < 1.01 * low), bool(abs(high / (2 * np.pi) - 1) < 1e-2)
     (True, True)
-
     """
     boundary, holes = mesh.outer_and_holes(outer)
     pair = conjugate_functions(mesh, boundary, holes)
@@ -264,7 +259,6 @@ def certify(mesh: DiskMesh, corners: Indices | None = None) -> Certificate:
     >>> found = certify(disk)
     >>> abs(found.off(disk.V[found.corners, 0] + 1j * disk.V[found.corners, 1])) < 0.01
     True
-
     """
     chosen = four_points(mesh) if corners is None else np.asarray(corners, dtype=np.int64)
     at = {int(vertex): k for k, vertex in enumerate(mesh.boundary)}
@@ -297,7 +291,6 @@ def four_points(mesh: DiskMesh) -> Indices:
     ------
     AlgorithmFailed
         The boundary has fewer than four vertices.
-
     """
     boundary = mesh.boundary
     if len(boundary) < 4:

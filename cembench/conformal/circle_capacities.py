@@ -49,7 +49,6 @@ def circle_capacities(centres: Complex, radii: Real) -> tuple[Real, float]:
     >>> C, error = circle_capacities(np.array([0j]), np.array([0.5]))
     >>> bool(abs(C[0, 0] - 2 * np.pi / np.log(2)) < 1e-9), error < 1e-9
     (True, True)
-
     """
     apart = [
         abs(centres[i] - centres[j]) - radii[i] - radii[j]

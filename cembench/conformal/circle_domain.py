@@ -38,7 +38,6 @@ class BoundaryLoops:
         Number of vertices on each circle.
     outer : int
         Index of the outer circle.
-
     """
 
     sizes: tuple[int, ...]
@@ -109,7 +108,6 @@ class CircleDomain:
         0 and 1 for the outer circle.
     least : float (B,)
         Minimal length of each arc.
-
     """
 
     rims: BoundaryLoops

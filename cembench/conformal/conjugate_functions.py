@@ -41,7 +41,6 @@ class ConjugateFunctions:
     capacity, circulation : float (k, k)
         Products of the gradients of u, and of v, integrated: upper bounds, as quadratic forms, of
         the surface's capacities C, and of 4 pi^2 times their inverse.
-
     """
 
     u: Real
@@ -78,7 +77,6 @@ def conjugate_functions(mesh: HoledMesh, outer: Loop, holes: Sequence[Loop]) -> 
     >>> pair = conjugate_functions(ring, *ring.outer_and_holes())
     >>> bool(pair.capacity[0, 0] * pair.circulation[0, 0] > 4 * np.pi**2)
     True
-
     """
     with phase("boundary"):
         cut = cut_open(mesh)

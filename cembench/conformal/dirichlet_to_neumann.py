@@ -23,7 +23,6 @@ class DirichletToNeumann:
     ----------
     times, solved : callable
         Products with (B - 1, k) of S without its last row and column, and of the inverse of that.
-
     """
 
     def __init__(self, times: Callable[[Real], Real], solved: Callable[[Real], Real]) -> None:

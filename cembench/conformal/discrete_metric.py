@@ -82,7 +82,6 @@ class BlockPattern:
         The triangles.
     kept : bool (n,)
         Which vertices have a row and a column.
-
     """
 
     def __init__(self, F: Indices, kept: Mask) -> None:

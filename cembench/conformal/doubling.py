@@ -29,7 +29,6 @@ class DoubledSurface:
         The copy of each vertex of the surface; a boundary vertex is its own copy.
     size : int
         Number of vertices of both copies together.
-
     """
 
     F: Indices
@@ -71,7 +70,6 @@ def doubled_surface(
     ------
     AlgorithmFailed
         The mesh has no interior vertex.
-
     """
     if not len(mesh.interior):
         raise AlgorithmFailed("the mesh has no interior vertex, so both its copies coincide")

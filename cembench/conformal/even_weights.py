@@ -60,7 +60,6 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
     >>> after, taken = evened(mesh, before, 2)
     >>> bool(angle_errors(mesh, after).mean() <= angle_errors(mesh, before).mean())
     True
-
     """
     with phase("assembly"):
         gradient = _gradients(mesh)

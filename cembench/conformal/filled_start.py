@@ -69,7 +69,6 @@ def filled_start(
         Edge lengths along each boundary loop.
     outer : int
         The loop that goes to the unit circle.
-
     """
     rims = BoundaryLoops(tuple(len(along) for along in lengths), outer)
     own = equilibrium_measures(S, rims)

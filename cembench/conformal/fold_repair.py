@@ -47,7 +47,6 @@ def accepted_repair(
         ``folded_before_repair``, the number of folded triangles of `own`, and ``fold_repairs``, the
         number of rounds of repair. If there were any, ``before_repair`` has the metrics of `own`;
         if the repair was rejected, ``refused_repair`` has those of the repaired map.
-
     """
     with phase("folds"):
         folded = flipped_triangles(mesh, own)

@@ -72,7 +72,6 @@ def without_folds(mesh: DiskMesh, L: scipy.sparse.csc_array, z: Complex) -> tupl
     >>> z, rounds = without_folds(disk, laplacian(disk), disk.V[:, 0] + 1j * disk.V[:, 1])
     >>> rounds
     0
-
     """
     if not len(_folded(mesh, z)):
         return z, 0
@@ -156,7 +155,6 @@ def in_order(circle: Complex, least: float | Real = MIN_ARC) -> Complex:
     AlgorithmFailed
         The points do not go around the circle once and counter-clockwise, or more than the share
         `MAX_BACKWARD` of their arcs runs backward.
-
     """
     arcs = np.angle(np.roll(circle, -1) / circle)
     first = int(np.argmax(arcs)) + 1  # cut the circle where points are least crowded

@@ -108,7 +108,6 @@ def with_area_pi(
     ------
     AlgorithmFailed
         The boundaries enclose no positive area.
-
     """
     area = sum(polygon_area(uv[loop]) for loop in mesh.loops)
     if not area > 0:

@@ -46,7 +46,6 @@ def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
     ------
     AlgorithmFailed
         The mean does not reach 0: a single point has too much of the measure.
-
     """
     middle = complex(measure @ uv)
     for _ in range(GAUGE_STEPS):

@@ -81,7 +81,6 @@ def is_graded(mesh: DiskMesh) -> bool:
     >>> import cembench
     >>> is_graded(cembench.surface("hemi-ellipsoid", 600))
     False
-
     """
     return _shape(mesh)[1]
 
@@ -101,7 +100,6 @@ def usual_splits(faces: int) -> int:
     --------
     >>> usual_splits(100), usual_splits(5_000), usual_splits(100_000)
     (2, 1, 0)
-
     """
     return sum(faces * 4**k <= MAX_TRIANGLES for k in range(1, USUAL_SPLITS + 1))
 

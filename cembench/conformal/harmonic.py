@@ -41,7 +41,6 @@ def arc_length_circle(mesh: DiskMesh) -> Complex:
     >>> circle = arc_length_circle(cembench.surface("flat-disk", 600))
     >>> bool(np.allclose(abs(circle), 1))
     True
-
     """
     lengths = edge_lengths(mesh, mesh.boundary)
     travelled = np.concatenate([[0.0], np.cumsum(lengths)])
@@ -84,7 +83,6 @@ def harmonic_extension(
     >>> z = harmonic_extension(laplacian(disk), disk.boundary, arc_length_circle(disk))
     >>> z.shape == (disk.n,)
     True
-
     """
     return HarmonicExtension(L, fixed)(values)
 

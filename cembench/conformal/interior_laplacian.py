@@ -59,7 +59,6 @@ def solves_pay(interior: int, boundary: int) -> bool:
     True
     >>> solves_pay(17_089, 245)
     False
-
     """
     if boundary <= MIN_BOUNDARY or interior < 2 or not keeps_factors():
         return False
@@ -95,7 +94,6 @@ class InteriorLaplacian:
     ------
     NotPositiveDefinite
         L_ii is not positive definite.
-
     """
 
     def __init__(

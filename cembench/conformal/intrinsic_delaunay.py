@@ -49,7 +49,6 @@ def intrinsic_delaunay(F: Indices, lengths: Real, weights: Real) -> tuple[Indice
     .. [1] Fisher, Springborn, Schroeder, Bobenko, "An algorithm for the construction of intrinsic
            Delaunay triangulations with applications to digital geometry processing",
            Computing 81, 2007.
-
     """
     obtuse = np.count_nonzero(weights < 0)
     if not obtuse:

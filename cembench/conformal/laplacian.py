@@ -120,7 +120,6 @@ def laplacian(mesh: TriangleMesh, *, delaunay: bool = False) -> scipy.sparse.csc
     >>> L = laplacian(cembench.surface("flat-disk", 600))
     >>> bool(abs(L.sum(axis=1)).max() < 1e-12)
     True
-
     """
     if delaunay:
         return delaunay_laplacian(mesh)[0]

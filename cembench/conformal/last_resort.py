@@ -125,7 +125,6 @@ def valid_map(
     >>> z, extras = valid_map(disk, None)
     >>> extras["last_resort"]["mean_value_vertices"] == len(disk.interior)
     True
-
     """
     with phase("folds"):
         if folded is None:

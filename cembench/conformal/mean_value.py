@@ -44,7 +44,6 @@ def convex_extension(
     ------
     AlgorithmFailed
         The matrix cannot be factored: triangles are too thin.
-
     """
     with phase("assembly"):
         rows = W[free]

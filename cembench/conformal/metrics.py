@@ -84,7 +84,6 @@ def corner_angles(points: Real | Complex, F: Indices) -> Real:
     >>> import numpy as np
     >>> corner_angles(np.array([0, 1, 1j]), np.array([[0, 1, 2]])).round()
     array([[90., 45., 45.]])
-
     """
     V = _coordinates(points)
     return in_blocks(lambda some: _angles(V, some), F)
@@ -158,7 +157,6 @@ class BoundaryCircle:
         Its radius; NaN if the image determines no circle.
     circularity : float
         The largest ``| |z - c| - r | / r`` over the loop; infinite if there is no circle.
-
     """
 
     vertex: int
@@ -219,7 +217,6 @@ def in_common_gauge(mesh: TriangleMesh, uv: Complex) -> Complex:
     ------
     AlgorithmFailed
         A vertex lies outside the disk, or all but a point of the surface has collapsed.
-
     """
     if not np.abs(uv).max() <= 1 + NEAR_CIRCLE:
         raise AlgorithmFailed("a vertex lies outside the disk: the map has no common gauge")
@@ -383,7 +380,6 @@ class Metric:
     shown : {"overview", "page", "record"}
         The shortest kind of table with a column for it: a run's overview, a surface's page, or only
         the listing of a single record.
-
     """
 
     name: str
@@ -551,7 +547,6 @@ def all_metrics(mesh: TriangleMesh, uv: Complex) -> dict[str, float | int]:
     >>> found = all_metrics(disk, disk.V[:, 0] + 1j * disk.V[:, 1])
     >>> abs(found["conformal_energy"]) < 1e-12, found["flipped_triangles"]
     (True, 0)
-
     """
     figures = MapFigures(mesh, uv)
     return computed(METRICS, figures)

@@ -40,7 +40,6 @@ def three_point_map(p: Sequence[complex] | Complex, q: Sequence[complex] | Compl
     ------
     AlgorithmFailed
         Two of the points coincide, or are not finite.
-
     """
     points = np.array([p, q], dtype=np.complex128)
     apart = np.abs(points - np.roll(points, 1, axis=1)).min()

@@ -170,7 +170,6 @@ def overlap_share(curves: Sequence[Complex]) -> float:
     0.0
     >>> overlap_share([np.tile(square, 2) + np.repeat([0, 1e-3], 4)]) > 0.49
     True
-
     """
     if bounds_once(curves):
         return 0.0

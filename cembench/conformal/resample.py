@@ -32,7 +32,6 @@ def locate(
         The triangle; -1 for points outside.
     weights : float64 (k, 3)
         Barycentric coordinates, none negative.
-
     """
     import igl  # slow to load
 
@@ -65,7 +64,6 @@ def square_to_disk(w: Complex) -> Complex:
     References
     ----------
     .. [1] H. A. Schwarz, "Ueber einige Abbildungsaufgaben", J. reine angew. Math. 70 (1869).
-
     """
     quarter = special.ellipk(0.5)
     u = quarter * ((1 + 1j) / 2 * w - 1)

@@ -42,7 +42,6 @@ def ring_pays(interior: int, ring: int, boundary: int, iterations: int) -> bool:
     True
     >>> ring_pays(137_142, 1_482, 1_488, iterations=20)
     False
-
     """
     if ring == interior:
         return False

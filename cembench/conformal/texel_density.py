@@ -41,7 +41,6 @@ def texel_density_ratio(areas: Real, images: Real) -> float:
     >>> import numpy as np
     >>> texel_density_ratio(np.array([1.0, 1.0]), np.array([1.0, 9.0]))
     3.0
-
     """
     held = areas > 0
     areas, squared = areas[held], np.abs(images[held]) / areas[held]
@@ -68,7 +67,6 @@ def undersampled_share(areas: Real, images: Real, extent: float) -> float:
     -------
     float
         From 0 to 1, for a picture of :data:`SIDE` x :data:`SIDE` pixels.
-
     """
     if not extent:  # the map has collapsed to a point
         return 1.0
@@ -91,7 +89,6 @@ def texture_words(metrics: Mapping[str, float | int | None]) -> str:
     --------
     >>> texture_words({"texel_density_ratio": 2.26, "undersampled_share": 0.0})
     'texel density varies 2.3 : 1'
-
     """
     if "texel_density_ratio" not in metrics:
         return ""

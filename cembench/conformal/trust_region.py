@@ -56,7 +56,6 @@ def newton_step(
         CG ends if the residual's norm in M^-1 is this share of the gradient's.
     most : int
         Maximal number of products with H.
-
     """
     p, Hp = np.zeros_like(g), np.zeros_like(g)
     residual, y = g, uphill

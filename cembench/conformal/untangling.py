@@ -74,7 +74,6 @@ def untangled(
         The map with its free vertices moved; a patch may still be folded.
     patch : int64 (m,)
         The patch of each triangle; -1 for triangles without a free vertex.
-
     """
     patches = _Patches(mesh, z, free, graph)
     moving = z[patches.vertices]

@@ -43,7 +43,6 @@ class Place:
         Ratio of its largest to its smallest stretch; infinite if it has collapsed.
     angle_error_deg : float
         The largest change of its angles, in degrees.
-
     """
 
     triangle: int

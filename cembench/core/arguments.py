@@ -53,7 +53,6 @@ class Argument:
         The allowed numbers.
     meaning : str
         Its description in the docstring, on one line.
-
     """
 
     name: str

@@ -105,7 +105,6 @@ def write_by(
     ------
     `error`
         The disk is full, or the folder is not writable.
-
     """
     try:
         if path.exists() and not path.is_file():

@@ -19,7 +19,6 @@ def blocks(rows: int) -> Iterator[slice]:
     --------
     >>> list(blocks(20_000))
     [slice(0, 16384, None), slice(16384, 20000, None)]
-
     """
     for start in range(0, rows, ROWS):
         yield slice(start, min(start + ROWS, rows))
@@ -33,7 +32,6 @@ def in_blocks(of_rows: Callable[[NDArray[Any]], NDArray[Any]], rows: NDArray[Any
     >>> import numpy as np
     >>> in_blocks(lambda rows: rows.sum(axis=1), np.ones((20_000, 3))).shape
     (20000,)
-
     """
     if len(rows) <= ROWS:
         return of_rows(rows)

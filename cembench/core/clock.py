@@ -74,7 +74,6 @@ def phase(name: str) -> Iterator[None]:
     >>> _, timing = measure(call)
     >>> sorted(timing.phases)
     ['other', 'solve']
-
     """
     ledger = _ledger.get()
     if ledger is None:

@@ -18,7 +18,6 @@ class CembenchError(Exception):
     ... except cembench.CembenchError as error:
     ...     print(type(error).__name__)
     RegistryError
-
     """
 
 
@@ -32,7 +31,6 @@ class MeshError(CembenchError):
     Traceback (most recent call last):
     ...
     cembench.core.errors.MeshError: vertices have shape (1, 2); allowed is (n, 3), a row per vertex.
-
     """
 
 
@@ -46,7 +44,6 @@ class RegistryError(CembenchError):
     Traceback (most recent call last):
     ...
     cembench.core.errors.RegistryError: unknown surface 'no-such-surface'; known: ...
-
     """
 
 
@@ -60,7 +57,6 @@ class ParameterError(CembenchError):
     Traceback (most recent call last):
     ...
     cembench.core.errors.ParameterError: cone: angle=120 is not allowed: ... (default 30.0).
-
     """
 
 
@@ -83,7 +79,6 @@ class RecordError(CembenchError):
     Traceback (most recent call last):
     ...
     cembench.core.errors.RecordError: 'nowhere.json' cannot be read: ...
-
     """
 
     def __init__(self, message: str, detail: str = "") -> None:
@@ -107,7 +102,6 @@ class AlgorithmFailed(CembenchError):  # noqa: N818 - it is a result's status, n
     Traceback (most recent call last):
     ...
     cembench.core.errors.AlgorithmFailed: the boundary is too crowded
-
     """
 
 
@@ -126,7 +120,6 @@ class NotPositiveDefinite(AlgorithmFailed):
     Traceback (most recent call last):
     ...
     cembench.core.errors.NotPositiveDefinite: the matrix of order 2 is not positive definite ...
-
     """
 
 
@@ -145,7 +138,6 @@ class RenderError(CembenchError):
     Traceback (most recent call last):
     ...
     cembench.core.errors.RenderError: nowhere/a.html cannot be written: ...
-
     """
 
 

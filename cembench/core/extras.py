@@ -64,7 +64,6 @@ class MissingExtra(CembenchError):  # noqa: N818 - what is not there, as the mes
     >>> error = MissingExtra(Extra.VIDEO, "a film", ["imageio_ffmpeg"])
     >>> error.extra
     <Extra.VIDEO: 'video'>
-
     """
 
     def __init__(self, extra: Extra, purpose: str, missing: list[str]) -> None:
@@ -109,7 +108,6 @@ def require(extra: Extra, purpose: str, *modules: str) -> None:
     Examples
     --------
     >>> require(Extra.VIDEO, "a film", "numpy")
-
     """
     absent = missing(extra, *modules)
     if absent:

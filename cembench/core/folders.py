@@ -57,7 +57,6 @@ def check(folder: Path, kind: Kind) -> Marker | None:
     ------
     RecordError
         The path is a file, or a folder that holds other files.
-
     """
     if folder.exists() and not folder.is_dir():
         raise RecordError(f"{folder} is a file; name a folder with -o.")
@@ -98,7 +97,6 @@ def publish(draft: Path, folder: Path, kind: Kind) -> None:
     RecordError
         The folder is not ours, or a foreign or changed file has the name of a draft's file (nothing
         is changed then), or the folder cannot be written to.
-
     """
     marker = check(folder, kind) or Marker(kind=kind)
     before = marker.files or {}

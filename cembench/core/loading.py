@@ -85,7 +85,6 @@ def open_file(path: Path, root: Path | None = None, flags: int = os.O_RDONLY) ->
         It is not a regular file, or a link leads to it.
     OSError
         The system refuses to open it.
-
     """
     flags |= getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
     if root is None:
@@ -130,7 +129,6 @@ def read_bytes(path: Path, root: Path | None = None) -> bytes:
     ------
     RecordError
         The file is missing, is not a regular file, or may not be read, or a link leads to it.
-
     """
     try:
         with _opened(path, root) as file:
@@ -146,7 +144,6 @@ def read_json(path: Path, schema: TypeAdapter[T], what: str, root: Path | None =
     ------
     RecordError
         As for :func:`read_bytes`, or the content does not fit the schema.
-
     """
     content = read_bytes(path, root)
     try:
@@ -166,7 +163,6 @@ def read_arrays(
     ------
     RecordError
         The archive is missing or damaged, lacks an array, or declares one that exceeds memory.
-
     """
     try:
         with (
@@ -249,7 +245,6 @@ def files_in(folder: Path, pattern: str, root: Path | None = None) -> list[Path]
     RecordError
         It is not a folder, or cannot be listed (``Path.glob`` would silently find nothing), or a
         link below `root` leads to it.
-
     """
     try:
         if root is not None:
@@ -269,7 +264,6 @@ def is_there(path: Path) -> bool:
     ------
     RecordError
         The system does not answer (``Path.exists`` would return False, or raise).
-
     """
     try:
         path.lstat()

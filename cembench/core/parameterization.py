@@ -37,7 +37,6 @@ class Parameterization:
     >>> map_of_itself = cembench.Parameterization(disk.V[:, 0] + 1j * disk.V[:, 1])
     >>> map_of_itself.uv.shape == (disk.n,)
     True
-
     """
 
     uv: Complex
@@ -63,7 +62,6 @@ class Atlas:
     >>> import cembench, numpy as np
     >>> cembench.Atlas(np.array([[0, 1, 1j], [1, 1 + 1j, 1j]])).corners.shape
     (2, 3)
-
     """
 
     corners: Complex
@@ -95,7 +93,6 @@ class MapStep:
     >>> from cembench.algorithms.koebe_cem.steps import shown_steps
     >>> [step.boundary for step in shown_steps(cembench.surface("catenoid-ring", 400))]
     [1, 0]
-
     """
 
     sweep: int

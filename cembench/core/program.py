@@ -75,7 +75,6 @@ class Program:
         How to install the program.
     language : str
         "matlab" if words are code of MATLAB or Octave, in which each placeholder becomes a string.
-
     """
 
     command: tuple[str, ...]
@@ -123,7 +122,6 @@ def checked_program(name: str, program: Program, parameters: Iterable[str]) -> P
     RegistryError
         The command is empty, does not name the mesh file or has an unknown placeholder; a format is
         unknown; or the pattern is not a valid regular expression.
-
     """
     allowed = (*PLACES, *parameters)
     used = [m for word in program.command for m in _PLACEHOLDER.findall(word)]
@@ -177,7 +175,6 @@ def matlab_string(value: object) -> str:
     --------
     >>> print(matlab_string("it's {here}"))
     ['it''s ' char(123) 'here}']
-
     """
     literal = str(value).replace("'", "''").replace("{", "' char(123) '")
     return f"['{literal}']"
@@ -193,7 +190,6 @@ def of_matlab_function(file: Path) -> dict[str, str]:
     RegistryError
         The file's name cannot be that of a function, or its folder has a path that cannot be
         written in code.
-
     """
     folder = str(file.parent.absolute())
     if not re.fullmatch(r"[A-Za-z]\w*", file.stem, re.ASCII) or not folder.isprintable():
@@ -228,7 +224,6 @@ def words_of(command: str) -> list[str]:
     ------
     RegistryError
         A quotation mark is not closed.
-
     """
     try:
         return shlex.split(command)

@@ -39,7 +39,6 @@ def view_rotation(mesh: TriangleMesh) -> Real:
     -------
     float64 (3, 3)
         Rows: the unit vectors in space that point right, up, and towards the viewer.
-
     """
     _, normals, areas = _samples(mesh)
     net = areas @ normals / areas.sum()

@@ -33,7 +33,6 @@ class Checkerboard:
         For each square the number of its first part, row by row; -1 for an undivided square.
     depth : int
         How often the smallest squares are divided; 0 if none is.
-
     """
 
     low: Indices
@@ -53,7 +52,6 @@ class Checkerboard:
             Required depth of subdivision at the samples; not rounded.
         weights : float64 (k,)
             Weight of each sample: its share of the surface.
-
         """
         low = np.floor(places.min(axis=0)).astype(np.int64)
         across, up = np.floor(places.max(axis=0)).astype(np.int64) - low + 1

@@ -76,7 +76,6 @@ class Overlay:
         Closed curves; the first point is not repeated.
     marks : array
         Points to be ringed in red.
-
     """
 
     curves: tuple[NDArray[np.float64], ...]
@@ -102,7 +101,6 @@ def page(
         Title, caption and a note; each may be empty.
     size : tuple of int
         Width and height of the page in pixels.
-
     """
     whole = Image.new("RGB", size, "white")
     for picture, corner in zip((surface, image), panels_of(size), strict=True):

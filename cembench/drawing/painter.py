@@ -64,7 +64,6 @@ class Panel:
         The visible triangle at each sample.
     light : float64 (m, 3)
         Brightness of each triangle's corners, 0 to 1.
-
     """
 
     F: Indices

@@ -66,7 +66,6 @@ def write_preview(
         The map has the wrong shape or values that are not finite, or the size is too small.
     RenderError
         The file cannot be written, or the picture cannot be drawn.
-
     """
     png = preview_png(mesh, uv, title=title, caption=caption, size=size, turned=turned)
     write_bytes(path, png, error=RenderError, parents=False)

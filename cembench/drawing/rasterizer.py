@@ -33,7 +33,6 @@ class Raster:
         The triangle at each of them.
     weights : float64 (k, 3)
         Barycentric coordinates in that triangle.
-
     """
 
     size: int
@@ -65,7 +64,6 @@ def rasterize(corners: Real, size: int) -> Raster:
         the viewer. Both sides are visible; a triangle without area is not.
     size : int
         Pixels along a side.
-
     """
     place = np.stack([(corners[:, 0] + 1) / 2, (1 - corners[:, 1]) / 2], axis=1) * size - 0.5
     triangles = _Triangles.of(place.reshape(-1, 3, 2), corners[:, 2].reshape(-1, 3), size)

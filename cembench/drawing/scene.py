@@ -50,7 +50,6 @@ class Board:
         Position of each vertex on the board.
     squares : Checkerboard
         Which squares are divided.
-
     """
 
     places: Real

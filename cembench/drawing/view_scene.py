@@ -96,7 +96,6 @@ def view_scene(
     -------
     bytes
         The block; the same input gives the same bytes.
-
     """
     chosen = _neighbours_together(_simplified(mesh, most))
     first = upright(mesh, maps[0].z)

@@ -48,7 +48,6 @@ class LinearAlgebra:
         again for every solve, as the paper's MATLAB code did.
     backend : str
         The library that factors.
-
     """
 
     solves: Solves = "reuse"
@@ -96,7 +95,6 @@ def linear_algebra(solves: str = "reuse", backend: str | None = None) -> Iterato
     ...     x = Cholesky(2 * sparse.eye_array(3)).solve(np.ones(3))
     >>> x
     array([0.5, 0.5, 0.5])
-
     """
     if solves not in get_args(Solves):
         raise ParameterError(f"solves={solves!r} is unknown; allowed: {_names(Solves)}.")
@@ -197,7 +195,6 @@ class Cholesky:
     >>> A = sparse.csc_array([[2.0, 1.0], [1.0, 2.0]])
     >>> Cholesky(A).solve(np.array([3.0, 3.0]))
     array([1., 1.])
-
     """
 
     def __init__(
@@ -383,7 +380,6 @@ class Among:
     >>> ends = Cholesky(A).among(np.array([0, 8]))
     >>> ends.solve(np.array([1.0, 0.0])).round(4)
     array([0.9, 0.1])
-
     """
 
     def __init__(

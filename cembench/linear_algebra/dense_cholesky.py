@@ -23,7 +23,6 @@ class DenseCholesky:
     ------
     NotPositiveDefinite
         The matrix is not positive definite.
-
     """
 
     def __init__(self, A: NDArray[Any]) -> None:

@@ -73,7 +73,6 @@ class FactorPart:
         Where the rows are among these columns.
     share : float
         The part's entries over those of the whole factor.
-
     """
 
     def __init__(self, tree: FactorTree, rows: Indices) -> None:

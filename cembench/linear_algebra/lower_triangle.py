@@ -29,7 +29,6 @@ def permuted_lower(A: scipy.sparse.csr_array, order: Indices) -> scipy.sparse.cs
     >>> permuted_lower(A, np.array([2, 0])).toarray()
     array([[6., 0.],
            [2., 4.]])
-
     """
     k = len(order)
     rows = A[order]

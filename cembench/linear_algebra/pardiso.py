@@ -26,7 +26,6 @@ def pardiso_solver(A: sparse.csc_array) -> Callable[[Real], Real]:
     ------
     NotPositiveDefinite
         The factorisation broke down.
-
     """
     with phase("factorisation"):
         # Pardiso reads the upper triangle by rows and needs every diagonal entry stored.

@@ -21,7 +21,6 @@ def superlu_solver(A: sparse.csc_array) -> Callable[[Real], Real]:
     ------
     NotPositiveDefinite
         The matrix is singular, or has a pivot that is not positive.
-
     """
     with phase("factorisation"):
         try:

@@ -98,7 +98,6 @@ def trailing_block(factor: Any, n: int, leading: int) -> Real | None:
     -------
     C : float64 (n - leading, n - leading), Fortran order
         Lower triangular with positive diagonal; None if the structure is not as expected.
-
     """
     held = held_factor(factor, n)
     if held is None:

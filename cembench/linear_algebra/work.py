@@ -27,7 +27,6 @@ class Work:
         report it.
     dense, dense_order : int
         Dense factorisations, and the largest order of one.
-
     """
 
     symbolic: int = 0
@@ -60,7 +59,6 @@ def counting() -> Iterator[Work]:
     ...     x = Cholesky(sparse.eye_array(4)).solve(np.ones((4, 3)))
     >>> work.numeric, work.right_hand_sides, work.order
     (1, 3.0, 4)
-
     """
     token = _work.set(Work())
     try:

@@ -13,7 +13,6 @@ along a shortest path between two distant points.
 References
 ----------
 .. [1] J. Erickson, K. Whittlesey, "Greedy optimal homotopy and homology generators", SODA 2005.
-
 """
 
 from __future__ import annotations
@@ -89,7 +88,6 @@ def cut_open(mesh: TriangleMesh, through: Sequence[int] = ()) -> DiskCut:
         The surface is not connected.
     ParameterError
         A vertex is not in the mesh, or two neighbours are the only vertices given on a sphere.
-
     """
     pieces = components(mesh.F, mesh.n)
     if pieces is not None:
@@ -138,7 +136,6 @@ def cut_along(mesh: TriangleMesh, edges: Indices) -> Cut:
         Two vertices are not joined by an edge.
     UnusableMeshError
         The surface is not connected.
-
     """
     pieces = components(mesh.F, mesh.n)
     if pieces is not None:
@@ -177,7 +174,6 @@ def edges_of_paths(mesh: TriangleMesh, paths: Iterable[Sequence[int]]) -> Indice
     ------
     ParameterError
         A vertex is not in the mesh, or a path has fewer than two.
-
     """
     net = _Net.of(mesh)
     graph = net._distances()
@@ -207,7 +203,6 @@ def read_seams(path: Path) -> list[list[int]]:
     ------
     ParameterError
         The file cannot be read, or a line holds anything else.
-
     """
     try:
         lines = path.read_text(encoding="utf-8").splitlines()

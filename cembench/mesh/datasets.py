@@ -93,7 +93,6 @@ class Dataset:
         The object that it shows; "" for one that no other dataset shows.
     part : Part, optional
         For a file that is part of a model and not a surface: what is kept of it.
-
     """
 
     name: str
@@ -209,7 +208,6 @@ def fetch(
         The download libraries are not installed.
     RecordError
         The cache cannot be written to, or its disk is full.
-
     """
     if is_fetched(dataset):
         return dataset.path
@@ -301,7 +299,6 @@ def fetch_all(
     ------
     RecordError
         The cache cannot be written to, or its disk is full; no further download is started.
-
     """
     by_source: dict[str, list[Dataset]] = {}
     for dataset in datasets:

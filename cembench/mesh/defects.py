@@ -249,7 +249,6 @@ def as_arrays(V: ArrayLike, F: ArrayLike) -> tuple[Points, Indices]:
     MeshError
         The arrays have other shapes, the indices are not integers or count from 1, or there are no
         faces.
-
     """
     points, faces = array_of("vertices", V, 3), array_of("faces", F, 3)
     if points.dtype.kind in "iu" and faces.dtype.kind == "f" and faces.ndim == 2:
@@ -421,7 +420,6 @@ def oriented(F: Indices) -> tuple[Indices, Mask, Indices]:
     contradictions : int64 (k, 2)
         Directed edges that two triangles still share; empty unless the surface is one-sided or has
         non-manifold edges.
-
     """
     if not len(topology.repeated_half_edges(F)):
         return F, np.zeros(len(F), dtype=bool), np.empty((0, 2), dtype=np.int64)

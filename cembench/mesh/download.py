@@ -61,7 +61,6 @@ class Bounds:
         When the download must have ended, as :func:`time.monotonic` counts.
     stop : Event
         Ends the download once it is set.
-
     """
 
     size: int = LARGEST
@@ -81,7 +80,6 @@ def download(url: str, file: BinaryIO, bounds: Bounds, progress: Progress | None
     ------
     DownloadError
         The server does not answer, breaks off, or a bound is reached.
-
     """
     messages: Queue[_Message] = Queue(_WAITING_CHUNKS)
     abandoned = threading.Event()

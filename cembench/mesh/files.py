@@ -132,7 +132,6 @@ def read_soup(
     MeshError
         The file is missing, empty, damaged, of unknown format or not a regular file, or it has no
         faces.
-
     """
     path = Path(path)
     try:
@@ -262,7 +261,6 @@ def read_mesh(
     >>> mesh = cembench.read_mesh("disk.obj")
     >>> mesh.name, mesh.m
     ('disk', 600)
-
     """
     soup = read_soup(path, arrays=arrays, polygons=polygons)
     kinds: Any = (DiskMesh, HoledMesh) if mesh_type is None else (mesh_type,)
@@ -276,7 +274,6 @@ def most_special(soup: Soup, kinds: Sequence[type[M]], path: Path | None = None)
     ------
     MeshError
         None fits; the message says why it is not of the first.
-
     """
     refused: dict[type[M], MeshError] = {}
     for kind in sorted(kinds, key=lambda kind: len(kind.mro()), reverse=True):
@@ -294,7 +291,6 @@ def repaired_soup(soup: Soup, path: Path | None = None) -> tuple[Soup, Repaired]
     ------
     MeshError
         Nothing is left of its mesh.
-
     """
     repaired = repair_soup(soup, path)
     notices = soup.notices + repaired.notices
@@ -337,7 +333,6 @@ def checked(soup: Soup, mesh_type: type[M], path: Path | None = None) -> M:
     ------
     MeshError
         A check fails.
-
     """
     if path is not None:
         soup, _ = soup.without_isolated()
@@ -386,7 +381,6 @@ def write_mesh(
     >>> import cembench
     >>> disk = cembench.surface("flat-disk", 600)
     >>> cembench.write_mesh("disk_uv.obj", disk, disk.V[:, 0] + 1j * disk.V[:, 1])
-
     """
     path, n = Path(path), mesh.n
     allowed = f"one value for each of the {n} vertices: complex, shape ({n},), or real, ({n}, 2)"

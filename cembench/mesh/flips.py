@@ -14,7 +14,6 @@ class Independence:
     ----------
     m : int
         Number of triangles.
-
     """
 
     def __init__(self, m: int) -> None:

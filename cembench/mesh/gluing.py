@@ -95,7 +95,6 @@ def glue(F: Indices, pairs: Indices, n: int) -> tuple[Indices, Indices]:
     origin : int64 (n',)
         The input vertex that each new vertex is a copy of. Input vertex i stays vertex i, with one
         of its fans; the copies for its other fans are numbered from `n` on.
-
     """
     corner = np.arange(F.size).reshape(F.shape)
     following = np.roll(corner, -1, axis=1).ravel()

@@ -40,7 +40,6 @@ class Triangulation:
         Number of flips so far.
     log : list of int64 arrays, optional
         If there is one, the half-edges that were flipped are added to it, a round at a time.
-
     """
 
     F: Indices
@@ -87,7 +86,6 @@ class Triangulation:
         ------
         AlgorithmFailed
             The flips do not end.
-
         """
         apart = Independence(len(self.F))
         h = np.arange(len(self.twin)) if among is None else among

@@ -37,7 +37,6 @@ def triangulate(V: Points, corners: Indices, sizes: Indices) -> Indices:
         Triangles in the order of the polygons and with their orientation, as places in `corners`. A
         polygon that crosses itself in its plane, or is not finite, has no triangulation and is cut
         into a fan.
-
     """
     if (sizes == 3).all():
         return np.arange(3 * len(sizes)).reshape(-1, 3)

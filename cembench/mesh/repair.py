@@ -193,7 +193,6 @@ def repair(
     >>> found = repair(V, np.array([[0, 1, 2], [2, 0, 3], [0, 1, 2]]))
     >>> len(found.surfaces), found.counts["duplicate_triangles_dropped"]
     (1, 1)
-
     """
     _check_options(weld, fill_holes, components)
     steps = dict.fromkeys(Step, 0)

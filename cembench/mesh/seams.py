@@ -61,7 +61,6 @@ def are_copies(F: Indices, first: Indices) -> bool:
         that is closed otherwise, as decimation leaves them; where copies follow their originals at
         few regular distances, as on the sides of a grid; and where the last vertices are copies of
         the first, as of its first row. A cut adds its copies at the end, in the order of its curve.
-
     """
     at, counts = first[F], np.bincount(first)
     joined = marked(len(counts), at[at == np.roll(at, 1, axis=1)])

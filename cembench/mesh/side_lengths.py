@@ -21,7 +21,6 @@ def side_lengths(V: Real, F: Indices) -> Real:
     -------
     float (m, 3)
         In the unit of V. Side c runs from corner c + 1 to corner c + 2 (modulo 3).
-
     """
     return np.linalg.norm(V[F[:, [2, 0, 1]]] - V[F[:, [1, 2, 0]]], axis=2)
 

@@ -57,7 +57,6 @@ class Soup:
         Texture coordinates; v points up.
     uv_index : int64 (sum of sizes,), optional
         The texture coordinate of each corner, :data:`NO_UV` for none (default: that of its vertex).
-
     """
 
     V: Points
@@ -100,7 +99,6 @@ class Soup:
         MeshError
             A polygon has fewer than three corners, an index is out of range, or there is neither a
             polygon nor a texture coordinate.
-
         """
         V = np.asarray(V, dtype=np.float64).reshape(-1, 3)
         places: Indices = np.asarray(corners, dtype=np.int64).ravel() - counted_from
@@ -141,7 +139,6 @@ class Soup:
         ------
         MeshError
             There are no such polygons.
-
         """
         if not 0 <= first <= last < len(self.sizes):
             raise MeshError(
@@ -242,7 +239,6 @@ def in_single_precision(points: Points, format_name: str) -> NDArray[np.float32]
     ------
     MeshError
         The coordinates are too large for single precision.
-
     """
     largest = float(np.finfo(np.float32).max)
     if np.abs(points).max(initial=0.0) > largest:
@@ -290,7 +286,6 @@ def to_number(kind: type[_N], word: str) -> _N:
     ------
     NotANumberError
         It is not one.
-
     """
     try:
         return kind(word)

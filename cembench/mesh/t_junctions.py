@@ -29,7 +29,6 @@ def split_t_junctions(V: Points, F: Indices) -> tuple[Indices, Indices, int]:
         The triangle that each is, or is a part of.
     count : int
         Number of vertices at which sides were divided.
-
     """
     edges, edge, faces = edges_of_half_edges(F)
     sides = np.flatnonzero(faces[edge] == 1)

@@ -46,7 +46,6 @@ def soup_of_heights(z: ArrayLike, x: ArrayLike | None = None, y: ArrayLike | Non
     ------
     MeshError
         The shapes do not fit, or every quadrilateral has a corner that is not finite.
-
     """
     heights = _real("heights", z)
     if heights.ndim != 2 or min(heights.shape) < 2:

@@ -72,7 +72,6 @@ class TriangleMesh:
     >>> tetrahedron = cembench.TriangleMesh(V, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     >>> tetrahedron.n, tetrahedron.m, len(tetrahedron.loops)
     (4, 4, 0)
-
     """
 
     V: Real
@@ -93,7 +92,6 @@ class TriangleMesh:
             the wrong topology. The error lists all of these problems.
         MeshError
             The arrays have the wrong shape or type.
-
         """
         kind = type(self)
         V, F = as_arrays(V, F)
@@ -227,7 +225,6 @@ class DiskMesh(TriangleMesh):
     >>> square = cembench.DiskMesh(V, [[0, 1, 2], [0, 2, 3]])
     >>> square.boundary
     array([0, 1, 2, 3])
-
     """
 
     @property
@@ -270,7 +267,6 @@ class HoledMesh(TriangleMesh):
     >>> outer, holes = ring.outer_and_holes()
     >>> len(holes)
     1
-
     """
 
     def outer_and_holes(self, outer: int | None = None) -> tuple[Indices, tuple[Indices, ...]]:
@@ -297,7 +293,6 @@ class HoledMesh(TriangleMesh):
         ------
         ParameterError
             There is no such vertex, or it is not on a boundary loop.
-
         """
         lengths = [
             np.linalg.norm(np.roll(self.V[loop], -1, axis=0) - self.V[loop], axis=1).sum()

@@ -29,7 +29,6 @@ def to_unit_square(z: Complex) -> Complex:
     >>> import numpy as np
     >>> to_unit_square(np.array([-1, 1j, 0.6 - 0.8j]))
     array([0. +0.5j, 0.5+1.j , 0.8+0.1j])
-
     """
     if abs(np.abs(z).max() - 1) <= _ROUNDING:
         moved = (z + (1 + 1j)) / 2

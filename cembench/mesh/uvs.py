@@ -33,7 +33,6 @@ def read_uv(path: Path) -> Soup:
     ------
     MeshError
         The file is damaged, cut short or holds no UVs.
-
     """
     try:
         file = _READERS[path.suffix.lower()](path, uv=True)
@@ -55,7 +54,6 @@ def read_with_uv(path: Path) -> Soup:
     ------
     MeshError
         The file cannot be read as a surface, or holds no UVs.
-
     """
     suffix = path.suffix.lower()
     soup = read_soup(path, uv=suffix in READ_WITH_UV)
@@ -78,7 +76,6 @@ def read_flat(path: Path) -> Soup:
     ------
     MeshError
         The file is damaged, or its vertices do not lie in the plane z = 0.
-
     """
     soup = read_soup(path)
     V = soup.V
@@ -99,7 +96,6 @@ def uv_of_corners(file: Soup, V: Points, F: Indices) -> Complex:
         The file holds other vertices or triangles.
     MeshError
         There is not one UV for each vertex or corner.
-
     """
     assert file.uv is not None
     if not len(file.sizes):
@@ -133,7 +129,6 @@ def uv_numbers(file: Soup) -> Indices:
     ------
     MeshError
         There is no UV of this number.
-
     """
     assert file.uv is not None
     corners = file.uv_triangles

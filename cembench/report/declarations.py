@@ -25,7 +25,6 @@ def read(path: Path) -> dict[str, Any]:
     ------
     ParameterError
         The file cannot be read.
-
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
@@ -48,7 +47,6 @@ def parsed(declared: Mapping[str, Any], kind: type[D], where: str) -> dict[str, 
     ------
     ParameterError
         A declaration is wrong.
-
     """
     if not isinstance(declared, Mapping):
         raise ParameterError(f"{where}: write each declaration as a table of its own, [NAME].")
@@ -71,7 +69,6 @@ def filled(text: str, known: Mapping[str, Any]) -> str:
     ------
     ParameterError
         A name in braces is unknown, or the braces are wrong.
-
     """
     try:
         return with_words(text, **known)

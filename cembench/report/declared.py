@@ -216,7 +216,6 @@ def declared_table(
         The linear-algebra policy of its records; default: what the declaration says.
     texts : str
         What braces in title and caption stand for, besides ``{policy}``.
-
     """
     spec = declared or own_tables()[name]
     held = (policy,) if policy else evidence.policies[: None if spec.policy == "all" else 1]

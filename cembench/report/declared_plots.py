@@ -166,7 +166,6 @@ def further(
     ------
     ParameterError
         A file cannot be read, or a declaration is wrong or does not fit the run.
-
     """
     sections = []
     for number, path in enumerate(paths, start=1):
@@ -222,7 +221,6 @@ def declared_plot(
         Only the records of this surface.
     called : str
         Another name for the plot's files and anchor.
-
     """
     spec = declared or own_plots(evidence)[name]
     drawn: list[_Drawn] = []

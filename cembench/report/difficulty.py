@@ -31,7 +31,6 @@ class Difficulty:
     crowding : float
         The same along the boundary, in the common gauge: the 99 over the 1 percentile of the
         edges' image lengths over their lengths.
-
     """
 
     span: float
@@ -54,7 +53,6 @@ class Shape:
     boundary_excess : float
         Length of the boundary over that of a flat disk of the same area, 2 sqrt(pi A): large for
         surfaces with seams, cuts that follow a tree.
-
     """
 
     obtuse_share: float
@@ -110,7 +108,6 @@ def boundary_crowding(mesh: TriangleMesh, uv: NDArray[np.complex128]) -> float |
     float or None
         The 99 over the 1 percentile of image length over length of the boundary's edges; None
         if the map has no such gauge, or an edge has no length.
-
     """
     if not is_disk_map(mesh, uv):
         return None

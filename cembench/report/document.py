@@ -78,7 +78,6 @@ class Value:
         Why there is no number, or a remark on it (a misprint, an unstable time).
     tone : Tone
         How a terminal shows it.
-
     """
 
     text: str
@@ -186,7 +185,6 @@ class Figure:
         The paper's figure that it reproduces; empty for others.
     record : str
         Key of the record whose map it shows; empty for others.
-
     """
 
     name: str
@@ -266,7 +264,6 @@ class Claim:
     parts : mapping
         The verdicts apart, by origin of the surfaces, models first; "printed" is a control on the
         printed tables. `verdict` and `counted` are those of the first.
-
     """
 
     name: str
@@ -344,7 +341,6 @@ class Findings:
         Key figures.
     picture, plot : Figure or None
         They also occur in the report.
-
     """
 
     sentences: tuple[Sentence, ...]

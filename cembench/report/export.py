@@ -28,7 +28,6 @@ def export_rows(rows: Rows, path: Path, form: Literal["csv", "parquet", "json"])
         Parquet is requested, but pyarrow is not installed.
     RecordError
         The file cannot be written.
-
     """
     exporters = {"csv": _csv, "parquet": _parquet, "json": _json}
     if form == "parquet":

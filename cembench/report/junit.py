@@ -46,7 +46,6 @@ def write_junit(path: Path, verb: str, checks: Iterable[Check]) -> None:
         There is another file.
     RecordError
         It cannot be written.
-
     """
     check_junit(path, verb)
     root = Xml.Element("testsuites", name=f"cembench {verb}")

@@ -90,7 +90,6 @@ def embed_pixels(path: Path, cap: float, *, exact: bool) -> Embedded:
     ------
     RenderError
         The file does not exist, or is not a picture.
-
     """
     try:
         with Image.open(path) as opened:

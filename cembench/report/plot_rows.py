@@ -201,7 +201,6 @@ def cost_ratios(frame: pd.DataFrame, cost: pd.Series, least: float = 0.0) -> pd.
         Their costs, infinite where there is no good map.
     least : float
         Smaller costs count as this.
-
     """
     table = frame.assign(cost=cost).pivot(index="place", columns="label", values="cost")
     labels = frame.sort_values("series", kind="stable")[["label", "main"]].drop_duplicates("label")

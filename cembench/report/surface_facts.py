@@ -80,7 +80,6 @@ def find_facts(registry: Registry, surface: Surface) -> SurfaceFacts:
         The cache cannot be written.
     MeshError, AlgorithmFailed, RenderError
         The surface cannot be made, mapped, or drawn.
-
     """
     if surface.kept is None:
         raise RegistryError(

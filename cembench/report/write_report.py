@@ -65,7 +65,6 @@ def write_report(
     RecordError
         The folder `run` holds no run, no record, or no model of the paper; `folder` holds files
         that are not a report's or were changed since, or cannot be written.
-
     """
     evidence = Evidence.of(run, paper, records)
     own = evidence.paper.folder / MEASURED

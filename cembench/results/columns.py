@@ -114,7 +114,6 @@ class FrameColumn:
         Why a record that ended ok has no value.
     timed : bool
         Whether it is a time: marked if unstable, and with the letter of its machine.
-
     """
 
     name: str

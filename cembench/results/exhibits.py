@@ -109,7 +109,6 @@ def exhibit_folder(run: Path, name: str) -> Path:
     RecordError
         The folder `run` is not a run and not empty, or cannot be written to, or a link is in the
         exhibit's place.
-
     """
     run_folder.claim(run)
     folder = place_of(run, name)
@@ -134,7 +133,6 @@ def write_exhibit(run: Path, exhibit: Exhibit) -> Path:
     ------
     RecordError
         A picture that it names does not exist.
-
     """
     folder = exhibit_folder(run, exhibit.name)
     for picture in exhibit.pictures:
@@ -154,7 +152,6 @@ def read_exhibits(run: Path) -> list[Exhibit]:
     ------
     RecordError
         A description cannot be read, or a link leads to it.
-
     """
     described = [folder / _DESCRIPTION for folder in files_in(run / FOLDER, "*", run)]
     return [read_model(path, Exhibit, run) for path in described if is_there(path)]
@@ -170,7 +167,6 @@ def copy_exhibits(run: Path, into: Path) -> None:
     ------
     RecordError
         A description or a picture cannot be read or written, or a link is in its place.
-
     """
     held = {one.name: one for one in read_exhibits(into)}
     for exhibit in read_exhibits(run):

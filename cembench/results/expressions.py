@@ -48,7 +48,6 @@ def computed(expression: str, known: Mapping[str, Any]) -> Any:
     ------
     ParameterError
         The expression cannot be read, is more than one, fails, or takes too long or too much.
-
     """
     code, _ = _compiled(expression)
     try:
@@ -127,7 +126,6 @@ def with_words(text: str, *values: object, **known: object) -> str:
 
     >>> with_words("{n:,} triangles of {}", "hand", n=5000)
     '5,000 triangles of hand'
-
     """
     for _, name, form, _ in Formatter().parse(text):
         wide = form and ("{" in form or _has_many_digits(form))

@@ -79,7 +79,6 @@ def average_interval(
     log : bool
         Whether the average is the geometric mean, of which the interval is exact for normal
         logarithms. That of the arithmetic mean is too narrow for skew figures.
-
     """
     values = np.log(figures) if log else np.asarray(figures, dtype=float)
     if families is not None:

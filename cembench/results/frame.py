@@ -189,7 +189,6 @@ def evaluate(expression: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) 
     ------
     ParameterError
         The expression cannot be read, names something unknown, or fails on this frame.
-
     """
     known = {**FUNCTIONS, **more}
     for name in names_in(expression):
@@ -218,7 +217,6 @@ def filled(text: str, frame: Frame, more: Mapping[str, Any] = _NOTHING) -> str:
     ------
     ParameterError
         As for :func:`evaluate`.
-
     """
     # The space keeps a quotation mark at the end apart from those around.
     return str(evaluate(f'f"""{text} """', frame, more))[:-1]

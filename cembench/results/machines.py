@@ -67,7 +67,6 @@ def marks(records: Iterable[Record], environments: Environments) -> Marks:
     --------
     >>> marks([], {}).explained()
     []
-
     """
     chosen = list(records)
     counts = Counter(machine_of_record(record, environments) for record in chosen)

@@ -102,7 +102,6 @@ def others_of(run: Store) -> list[Store]:
     ------
     RecordError
         One of them is a link.
-
     """
     files = files_in(run.folder / "others", "*", run.folder)
     for folder in files:

@@ -34,7 +34,6 @@ def holm(chances: Sequence[float]) -> list[float]:
     --------
     >>> holm([0.01, 0.04, 0.03])
     [0.03, 0.06, 0.06]
-
     """
     adjusted = [0.0] * len(chances)
     so_far = 0.0

@@ -204,7 +204,6 @@ class StatedClaim(Declaration):
     on : tuple of {"measured", "printed"}
         What it is tested on: the run's surfaces, those of each origin apart, and the printed
         tables, as a control.
-
     """
 
     name: Annotated[str, Field(pattern=r"^[\w.-]+$")]
@@ -360,7 +359,6 @@ class Paper(Declaration):
         ------
         RegistryError
             It cannot be imported.
-
         """
         file = self.folder / "checks.py"
         if not file.is_file():
@@ -404,7 +402,6 @@ def read_paper(folder: Path, package: str = "") -> Paper:
     ------
     RegistryError
         A file is missing or cannot be read, or holds something else than allowed.
-
     """
     folder = folder.absolute()
     of_paper = [name for name in Paper.model_fields if name not in _ELSEWHERE]
@@ -540,7 +537,6 @@ def cell_number(text: str) -> float | None:
     --------
     >>> cell_number("54.5 ± 2.1"), cell_number("12,345"), cell_number("n/a")
     (54.5, 12345.0, None)
-
     """
     figure = text.partition("±")[0].partition("+/-")[0].strip()
     if figure.lower() in _GAPS:
@@ -638,7 +634,6 @@ def papers() -> Mapping[str, Paper]:
     ------
     RegistryError
         An entry point names no folder of a paper.
-
     """
 
     def place(entry: EntryPoint) -> tuple[bool, str]:
@@ -672,7 +667,6 @@ def find_paper(named: str, *, trust: bool = False) -> Paper:
         There is neither, or the folder holds no paper.
     ParameterError
         The folder has a checks.py, and is not trusted.
-
     """
     code = code_of(named)
     if code is not None and not trust:

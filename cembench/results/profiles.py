@@ -46,7 +46,6 @@ def surfaces_of(profile: Profile, registry: Registry) -> list[str]:
     ------
     RegistryError
         A model has no registered stand-in, or two.
-
     """
     standing: dict[str, list[str]] = {}
     for surface in registry.surfaces.values():

@@ -67,7 +67,6 @@ def centre_interval(values: Sequence[float], error: float = ERROR) -> Interval |
     --------
     >>> centre_interval([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
     Interval(low=1.0, high=6.0)
-
     """
     left_out = cut(len(values), error)
     if left_out < 0:

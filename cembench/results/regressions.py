@@ -79,7 +79,6 @@ def regressions(
         A kind is unknown.
     RecordError
         There was no valid map before; or "slower" cannot be decided by the rounds there are.
-
     """
     check_kinds(kinds := list(kinds))
     pairs = list(pairs)

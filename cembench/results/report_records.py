@@ -30,7 +30,6 @@ def text_rows(folder: Path) -> list[dict[str, str]]:
     ------
     RecordError
         The file cannot be read as such a table, or is too large.
-
     """
     file = next((folder / name for name in (PACKED, RECORDS) if (folder / name).is_file()), None)
     if file is None:

@@ -72,7 +72,6 @@ def signer(run: Path, allowed: Path, bundle: str = "") -> str:
         The run is not signed, or by none of them, or was changed since.
     ParameterError
         OpenSSH is not installed, or there is no such file.
-
     """
     if not allowed.is_file():
         raise ParameterError(f"{allowed}, the file of allowed signers, does not exist.")

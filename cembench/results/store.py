@@ -75,7 +75,6 @@ class Store:
         ------
         RecordError
             The record is damaged or was changed; a run must not resume from it.
-
         """
         path = self._found(self.record_file(cell), cell)
         if path is None:
@@ -108,7 +107,6 @@ class Store:
         ------
         RecordError
             The folder holds no run, or a record is damaged or of another schema.
-
         """
         self.check_is_run()
         return self.finished()
@@ -177,7 +175,6 @@ class Store:
         ------
         RecordError
             The file is damaged, or holds a different surface.
-
         """
         path = self.mesh_file(cell)
         if not is_there(path):
@@ -248,7 +245,6 @@ class Store:
         RecordError
             The folder is neither a run nor empty (nothing is changed in it), or it cannot be
             written to.
-
         """
         run_folder.check(self.folder)
         lock = self._lock()

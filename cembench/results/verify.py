@@ -109,7 +109,6 @@ def sound_records(store: Store, depth: Depth) -> list[Record]:
     ------
     RecordError
         There is no run, or its contents disagree.
-
     """
     store.check_is_run()
     verified = verify(store, depth)

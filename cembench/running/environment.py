@@ -65,7 +65,6 @@ def for_measuring(threads: int) -> dict[str, str]:
     --------
     >>> for_measuring(1)["OMP_NUM_THREADS"]
     '1'
-
     """
     given = {name: value for name, value in (os.environ | _CHANGED).items() if value is not None}
     own = [one for one in given.get(ALLOCATOR_VARIABLE, "").split(":") if one]

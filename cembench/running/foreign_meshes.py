@@ -36,7 +36,6 @@ def soup_of(surface: Any) -> Soup:
     MeshError
         It is none of these, or its arrays are not those of polygons; the message has the expression
         that makes a surface of it, where one is known.
-
     """
     if isinstance(surface, TriangleMesh):
         notices = of_kind(NoticeKind.CUT_OPEN, surface.notices)

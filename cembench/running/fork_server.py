@@ -50,7 +50,6 @@ class ForkServer:
     ------
     ServerGoneError
         The server could not load the libraries, or one of them starts threads.
-
     """
 
     def __init__(self, environment: Mapping[str, str], backend: str) -> None:

@@ -43,7 +43,6 @@ def given_maps(
     ParameterError
         The folder cannot be listed, no file in it is a map of one of these surfaces, two of them
         are maps of the same one, or the target is unknown.
-
     """
     name, _, target = called.partition(":")
     where = f"maps={called}={str(folder)!r}"
@@ -91,7 +90,6 @@ def surface_of(file: Soup, meshes: Sequence[TriangleMesh]) -> tuple[TriangleMesh
     ------
     MeshError
         It is none of these, or a corner has no UV.
-
     """
     count = len(file.triangles)
     why = f"no surface of this run has its {count:,} triangles"

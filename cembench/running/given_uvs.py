@@ -33,7 +33,6 @@ def surface_and_uv(
     ------
     MeshError
         There is no surface, or not one finite UV for each vertex or corner.
-
     """
     named = isinstance(surface, str | os.PathLike)
     if named and not more:

@@ -214,7 +214,6 @@ def save_array(path: Path, array: NDArray[Any]) -> None:
     ------
     OSError
         It cannot be written; the error has the file's name, and the reason.
-
     """
     head, array = io.BytesIO(), np.ascontiguousarray(array)
     np.lib.format.write_array_header_1_0(head, np.lib.format.header_data_from_array_1_0(array))

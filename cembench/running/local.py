@@ -94,7 +94,6 @@ def map_once(task: Task, options: Options | None = None) -> tuple[Record, Comple
     ------
     RecordError
         The temporary folder is full, or cannot be written to.
-
     """
     started = now()
     try:

@@ -214,7 +214,6 @@ def refinement_of(algorithm: Algorithm) -> Callable[..., Any]:
     ------
     ParameterError
         The algorithm has no such map.
-
     """
     if algorithm.refinement is None:
         raise ParameterError(

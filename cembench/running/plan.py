@@ -55,7 +55,6 @@ class Provenance:
         independent samples; "" if unknown, which makes the surface a family of its own.
     fitted : str
         The algorithm whose printed figures the surface was fitted to, if any.
-
     """
 
     paper_row: str = ""
@@ -108,7 +107,6 @@ def plan_cells(
         No algorithm has such a parameter, or one refuses its value.
     MeshError
         Two different surfaces have the same name, or no algorithm takes a surface.
-
     """
     meshes = list({(mesh.name, mesh.hash): mesh for mesh in meshes}.values())
     names = [mesh.name for mesh in meshes]
@@ -222,7 +220,6 @@ def mesh_files(folder: Path) -> list[Path]:
     ------
     MeshError
         The path is not a folder, cannot be listed, or has no mesh files.
-
     """
     try:
         named = (path for path in folder.iterdir() if is_named_like_a_mesh(path))

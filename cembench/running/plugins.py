@@ -31,7 +31,6 @@ def load_with_plugins(plugins: Sequence[str], seconds: float = IMPORT_SECONDS) -
     RegistryError
         As :func:`~cembench.registry.load_registry`; also if importing a plug-in ends the process,
         or takes longer than `seconds`.
-
     """
     for plugin in plugins:
         if not plugin.startswith(COMMAND):  # data only, which imports nothing

@@ -67,7 +67,6 @@ class Relay:
         ------
         RegistryError
             The interpreter does not start, or the version has no such solver.
-
         """
         asked = {"name": self.solver, "folder": self.folder, "plugins": self.plugins}
         words = [self.python, "-P", str(SERVER), json.dumps(asked)]
@@ -132,7 +131,6 @@ def declared(number: int, relay: Relay) -> str:
     ------
     RegistryError
         As :meth:`Relay.start`.
-
     """
     try:
         said = relay.start()

@@ -50,7 +50,6 @@ def motion(name: str) -> tuple[Real, Real]:
     >>> matrix, shift = motion("round 1, call 2")
     >>> bool(np.allclose(matrix @ matrix.T, np.eye(3), atol=0.01))
     True
-
     """
     if name == UNMOVED:
         return np.eye(3), np.zeros(3)

@@ -262,7 +262,6 @@ def affordable(
         The cell with which a cell is compared, and so measured side by side.
     seconds : float
         Remaining seconds; infinite without a limit.
-
     """
     lacking = [label for label in lacks if lacks[label] > 1]
     widest = sorted(lacking, key=lambda label: (-lacks[label], label))

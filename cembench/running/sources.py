@@ -36,7 +36,6 @@ def sources_of(algorithm: Algorithm) -> dict[str, str]:
     ------
     RegistryError
         The declaring file does not exist or cannot be read.
-
     """
     more = {} if algorithm.program is None else program_sources(algorithm.program)
     file = algorithm.file

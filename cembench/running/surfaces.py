@@ -94,7 +94,6 @@ def load_surface(
     >>> V = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     >>> type(cembench.load_surface((V, [[0, 1, 2], [0, 2, 3]]))).__name__
     'DiskMesh'
-
     """
     allowed = tuple(kind for kind in kinds if holes or not issubclass(kind, HoledMesh))
     path, name = None, ""
@@ -135,7 +134,6 @@ def prepared(
     ------
     MeshError
         The surface is of none of these kinds; the message says why it is not of the first.
-
     """
     repaired = None
     file = path or Path(soup.name)
@@ -173,7 +171,6 @@ def file_named(path: Path, registry: Registry) -> Path:
     ------
     MeshError
         It is neither, or the public surface is not here yet.
-
     """
     if path.suffix or path.exists() or len(path.parts) > 1:
         return path

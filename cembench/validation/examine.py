@@ -91,7 +91,6 @@ def examine(
     CembenchError
         A baseline or surface is unknown, or the algorithm does not take a surface; raised before
         anything is timed.
-
     """
     started = monotonic()
     algorithm = solver.algorithm
@@ -298,7 +297,6 @@ def baselines(
         A name is unknown.
     ParameterError
         A baseline takes other surfaces, or is the algorithm itself.
-
     """
     if asked is None:
         return usual_rival(algorithm, registry, USUAL_REFERENCES)

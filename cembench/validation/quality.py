@@ -129,7 +129,6 @@ def comparison_with(records: Sequence[Record], ours: str, baseline: str) -> Base
     ------
     ValueError
         One of them has no record.
-
     """
     mine = {r.cell.mesh: r for r in records if r.cell.algorithm == ours}
     theirs = {r.cell.mesh: r for r in records if r.cell.algorithm == baseline}

@@ -98,7 +98,6 @@ def sizes(up_to: int) -> tuple[int, ...]:
     ------
     ParameterError
         `up_to` is so small that the start of a call dominates.
-
     """
     if up_to < MIN_UP_TO:
         raise ParameterError(

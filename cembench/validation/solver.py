@@ -76,7 +76,6 @@ def load_solver(text: str) -> tuple[Algorithm, Registry, tuple[str, ...]]:
     RegistryError
         There is no such file or name, the file cannot be imported, or it declares no algorithm, or
         several without one being named.
-
     """
     if text.startswith(COMMAND):
         registry = load_registry([text])

@@ -22,7 +22,6 @@ def append_markdown(validation: Validation, path: Path) -> None:
     ------
     RecordError
         The file cannot be read or written.
-
     """
     sign = "✅" if validation.passed else "❌"
     title = f"{sign} {validation.title}: {'passed' if validation.passed else 'did not pass'}"

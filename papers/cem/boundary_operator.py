@@ -51,7 +51,6 @@ class Check:
         The deciding number.
     meaning : str
         Meaning of that number.
-
     """
 
     name: str
@@ -79,7 +78,6 @@ class Trajectory:
         The largest number of backward arcs in any iterate.
     boundary : complex128 (B,)
         The last iterate.
-
     """
 
     energies: Real

@@ -43,7 +43,6 @@ class HoledMaps(dict[str, "Result"]):
     >>> found = cembench.holes(cembench.surface("catenoid-ring", 200), sweeps=1)
     >>> [row["status"] for row in found.rows]
     ['ok', 'ok', 'ok']
-
     """
 
     def __init__(self, maps: Mapping[str, Result], rows: Sequence[dict[str, Any]]) -> None:
@@ -106,7 +105,6 @@ def holes(
     >>> found = cembench.holes(cembench.surface("catenoid-ring", 200), sweeps=1)
     >>> sorted(found)
     ['direct-cem-holes', 'harmonic-filled', 'koebe-cem']
-
     """
     from cembench.registry import load_registry
     from cembench.results import exhibits, run_folder

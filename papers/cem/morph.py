@@ -98,7 +98,6 @@ def morph(
     >>> path = cembench.morph([face, (face.V * [1, 1, 2], face.F)])
     >>> path.at(0.5).shape == (face.n, 3)
     True
-
     """
     from dataclasses import replace
     from time import perf_counter

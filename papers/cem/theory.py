@@ -67,7 +67,6 @@ def theory(
     >>> import cembench
     >>> cembench.theory(cembench.surface("flat-disk", 200)).facts["premises_hold"]
     True
-
     """
     from cembench.registry import load_registry
     from cembench.results import exhibits, run_folder

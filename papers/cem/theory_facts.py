@@ -53,7 +53,6 @@ class TheoryFacts:
         Eigenvalues of K: all of them if K is small enough to be formed, else the leading ones.
     missing : str
         Why there is no other algorithm; empty if there is one.
-
     """
 
     facts: Mapping[str, Any]

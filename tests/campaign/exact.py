@@ -39,7 +39,6 @@ def faults_of_map(uv: Sequence[complex], faces: Sequence[Face], target: str) -> 
         "disk", "circular holes", "disk with holes" or "free boundary".
 
     A free boundary may overlap itself (see :func:`overlaps`); everything else must not.
-
     """
     points = [(Fraction(z.real), Fraction(z.imag)) for z in uv]
     turned = sum(side(*(points[k] for k in face)) <= 0 for face in faces)

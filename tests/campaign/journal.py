@@ -54,7 +54,6 @@ class Journal:
     ------
     WrongFolder
         It is of another seed or of other sources.
-
     """
 
     def __init__(self, folder: Path, about: dict[str, object]) -> None:

@@ -51,7 +51,6 @@ def soup_of_arrays(
     ------
     MeshError
         No pair fits, or several do; the message lists the arrays.
-
     """
     pair = asked or next((pair for pair in USUAL if set(pair) <= set(found)), None)
     notices: tuple[Notice, ...] = ()
@@ -100,7 +99,6 @@ def soup_of_uv(arrays: Mapping[str, NDArray[Any]], names: Iterable[str], counted
     ------
     MeshError
         There is no array ``uv``, or it has another shape; the message lists the `names`.
-
     """
     uv = next((arrays[name] for name in _UV_NAMES if name in arrays), None)
     index = next((arrays[name] for name in _INDEX_NAMES if name in arrays), np.empty((0, 3)))

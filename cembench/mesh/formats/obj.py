@@ -241,7 +241,6 @@ def with_uv(
         The triangles of the file's polygons in order, in either orientation, and the texture
         coordinate of each corner, if corners differ from their vertices. A polygon with a seam
         across it is replaced by its triangles.
-
     """
     blocks = None if uv_index is not None else _plain_blocks(text.encode("latin-1"))
     if blocks is not None:

@@ -74,7 +74,6 @@ def read(path: Path, *, uv: bool = False) -> Soup:
     ------
     MeshError
         The file is damaged, or holds no surface.
-
     """
     kind = _data_set(path)
     refused: MeshError | None = None

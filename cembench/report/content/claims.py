@@ -48,7 +48,6 @@ def claims(evidence: Evidence, inspections: Inspections) -> list[Claim]:
     ------
     ParameterError
         An expression of a claim fails on this run; the message names the claim and its file.
-
     """
     frame, known = claims_frame(evidence, inspections), known_names(evidence)
     tested = []

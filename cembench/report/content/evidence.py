@@ -107,7 +107,6 @@ class Evidence:
     RecordError
         Raised by :meth:`of` if the folder holds no run, or a run without records or without a
         model of the paper.
-
     """
 
     store: Store

@@ -49,7 +49,6 @@ def exhibit_sections(evidence: Evidence, folder: Path) -> list[Section]:
     ------
     RecordError
         The file of a picture holds something else, or a link leads to it.
-
     """
     names = distinct_slugs({digest(exhibit.name): exhibit.name for exhibit in evidence.exhibits})
     return [

@@ -50,7 +50,6 @@ class Angles:
         Number of corners.
     agrees : bool
         Whether their mean agrees with the record.
-
     """
 
     shares: NDArray[np.float64]

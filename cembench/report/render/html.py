@@ -72,7 +72,6 @@ class Facets:
         Names in tables and plots that mean one choice: its facet and its place among the choices.
     cells : mapping
         The places of each record's choices, by its key.
-
     """
 
     choices: Mapping[str, list[str]]
@@ -132,7 +131,6 @@ def write_html(report: Report, folder: Path) -> Path:
         A figure names a file that does not exist or is not a picture.
     RecordError
         The page cannot be written.
-
     """
     write_text(folder / FILE, render(report, folder))
     return folder / FILE

@@ -34,7 +34,6 @@ def append_section(path: Path, section: Section) -> None:
     ------
     RecordError
         The file cannot be read or written.
-
     """
     before = read_bytes(path).decode(errors="replace") if is_there(path) else ""
     _write(path, f"{before.rstrip()}\n{_forms().part(section, 2, None)}")

@@ -23,7 +23,6 @@ def view_page(title: str, scene: bytes, picture: bytes, facts: Sequence[tuple[st
         A PNG file, for browsers without WebGL.
     facts : sequence of pairs of str
         Names and texts shown below.
-
     """
     from markupsafe import Markup
 
@@ -53,6 +52,5 @@ def write_view_page(path: Path, page: str) -> None:
     ------
     RenderError
         The page cannot be written.
-
     """
     write_bytes(path, page.encode(errors="backslashreplace"), error=RenderError, parents=False)

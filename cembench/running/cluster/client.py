@@ -69,7 +69,6 @@ def run_on_cluster(
     ------
     ClusterError
         The scheduler is gone, or a worker cannot measure; finished units are in the store.
-
     """
     with recording(tasks, store, options, watcher) as recorder:
         run = _ClusterRun(recorder, client, same_environment)
@@ -310,7 +309,6 @@ class _ClusterRun:
         ------
         ClusterError
             The scheduler cannot be reached, or no worker is left that can measure.
-
         """
         self.looked = monotonic()
         before = self._connected()

@@ -90,7 +90,6 @@ def parse_cluster(text: str) -> ClusterPlace:
     --------
     >>> parse_cluster("local:4").workers
     4
-
     """
     if local := _LOCAL.fullmatch(text):
         return ClusterPlace("local", workers=int(local[1]))
@@ -134,7 +133,6 @@ def connected(where: ClusterPlace) -> Iterator[Client]:
         dask is not installed.
     ClusterError
         The scheduler cannot be reached.
-
     """
     where.check()
     import dask

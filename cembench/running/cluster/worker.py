@@ -58,7 +58,6 @@ def measure_unit(unit: Unit, topic: str) -> Answer:
     ------
     ClusterError
         This machine cannot measure the unit, or the unit was cancelled.
-
     """
     worker = get_worker()
     key = worker.get_current_task()
@@ -141,7 +140,6 @@ def measure(unit: Unit, store: Store, forwarder: Forwarder) -> list[Record]:
     ClusterError
         The surface arrived damaged, the machine has other code than the client, or the unit was
         cancelled.
-
     """
     plugins = tuple(_placed(name, files) for name, files in unit.plugins.items())
     for array in (unit.mesh.V, unit.mesh.F):

@@ -98,7 +98,6 @@ class ProgramCalls:
             The program is not installed.
         ProgramFault
             The program crashed, or wrote no map.
-
         """
         result, ended = self._run(mesh, watched=watched)
         self.own.append(self._own_seconds(ended.printed))

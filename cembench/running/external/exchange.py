@@ -64,7 +64,6 @@ def read_output(path: Path, algorithm: Algorithm, mesh: TriangleMesh) -> Paramet
     ------
     ProgramFault
         There is no such file, it is too large or damaged, or it holds a different surface.
-
     """
     _check_output(path, mesh)
     try:

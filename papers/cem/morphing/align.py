@@ -86,7 +86,6 @@ def aligned(
         The map with its first landmark at 0, turned to the least sum of squared distances of the
         other landmarks; with a single one, turned to the most similar curvature; with none, moved
         and turned to the most similar curvature.
-
     """
     z = centred(mesh, z, landmarks)
     if len(landmarks) > 1:

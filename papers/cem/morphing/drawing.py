@@ -53,7 +53,6 @@ def fitted_views(
     ------
     ParameterError
         An unknown view.
-
     """
     check_views(views)
     known = viewpoints(mesh)

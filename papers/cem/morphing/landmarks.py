@@ -31,7 +31,6 @@ class Landmarks:
         The k names.
     vertices : int64 (k, s)
         The vertex of each landmark on each of the s surfaces, counted from 0.
-
     """
 
     names: tuple[str, ...]
@@ -64,7 +63,6 @@ def read_landmarks(
     ParameterError
         The file cannot be read, a row has too few or too many entries, a surface has no landmark
         of that name, or :func:`check_landmarks` refuses them.
-
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
@@ -172,7 +170,6 @@ def check_order(
     ParameterError
         The orders around the first landmark contradict each other: names were exchanged, or one
         surface is a mirror image.
-
     """
     turns = [np.imag(np.conj(z[:, None]) * z[None, :]) for z in (first, other)]
     sizes = [np.maximum(np.abs(z[:, None]) * np.abs(z[None, :]), 1e-300) for z in (first, other)]

@@ -63,7 +63,6 @@ def registration_metrics(
         the target, in both directions; the mean and the largest over vertices and random points
         are given. Energies and dilatations are those of the registration map; None if a triangle
         is too thin for a finite value.
-
     """
     stretch = dilatations(target, registration.uv)
     apart = np.linalg.norm(carried[landmarks] - target.V[there], axis=1)

@@ -45,7 +45,6 @@ class Morph:
         The first surface's vertices on each surface; the first entry is the first surface itself.
     stops : tuple of float64 (n, 3)
         The same after posing: the stops of the path.
-
     """
 
     meshes: tuple[DiskMesh, ...]
@@ -97,7 +96,6 @@ class Morph:
             A file cannot be written.
         MissingExtra
             MP4 needs a package that is not installed.
-
         """
         from .writers import files_of, write_path
 
@@ -164,7 +162,6 @@ def morph(
         The orders of the landmarks around the first one contradict each other.
     AlgorithmFailed
         A registration without folds cannot be found.
-
     """
     places = landmarks.vertices
     first = meshes[0]

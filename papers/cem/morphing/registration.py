@@ -62,7 +62,6 @@ class Registration:
         Largest distance of a landmark from its target, in units of the disk's radius.
     exponent : float
         Exponent of the radial stretch before the first of several steps; 1 for none.
-
     """
 
     uv: Complex
@@ -101,7 +100,6 @@ def register(
     ------
     AlgorithmFailed
         The landmarks cannot be met without folds for any lambda.
-
     """
     if not len(landmarks):
         return Registration(start, (), 0.0)
@@ -235,7 +233,6 @@ def radially_stretched(
         The stretched map; no triangle is folded.
     k : float
         The exponent.
-
     """
     far = np.minimum(np.abs(z[landmarks]), np.abs(targets)) > 1e-9
     wanted_radii, own_radii = np.log(np.abs(targets[far])), np.log(np.abs(z[landmarks][far]))

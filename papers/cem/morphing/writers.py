@@ -96,7 +96,6 @@ def write_film(path: Path, pictures: Pictures) -> None:
     ------
     RecordError
         The file cannot be written, or the encoder failed.
-
     """
     if path.suffix.lower() == ".gif":
         atomic.write(path, lambda file: _save_gif(file, pictures))
@@ -181,7 +180,6 @@ def write_meshes(
     ------
     RecordError
         The files cannot be written.
-
     """
     files = mesh_files(path, len(times))
     place = files[0].parent
