@@ -1,6 +1,7 @@
 """The oracle for files: it knows every legal file, and sees what is planted."""
 
 import random
+import struct
 from types import SimpleNamespace
 
 import numpy as np
@@ -93,14 +94,22 @@ def test_what_nobody_reads_and_any_white_space_is_no_damage(suffix, text, tmp_pa
     assert (read.outcome, read.fault) == ("mesh", None)
 
 
-@pytest.mark.parametrize(("name", "outcome"), [("note", "mesh"), ("f", "refused")])
-def test_damage_within_a_variable_of_mat_counts_where_it_is_read(name, outcome, tmp_path):
+@pytest.mark.parametrize(
+    ("name", "after", "length", "outcome"),
+    [
+        (b"note", 8, 2**32 - 1, "mesh"),  # of numbers that nobody reads
+        (b"v\0\0\0", -32, 10, "mesh"),  # of flags, which always have eight bytes
+        (b"f\0\0\0", 8, 2**32 - 1, "refused"),
+    ],
+)
+def test_a_wrong_length_within_mat_counts_where_it_loses_something(
+    name, after, length, outcome, tmp_path
+):
     path = tmp_path / "a.mat"
     V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[1, 2, 3]], np.int32)
     savemat(path, {"note": np.array([[1.0, 2.0]]), "v": V, "f": F})
     data = bytearray(path.read_bytes())
-    at = data.index(b"note" if name == "note" else b"f\0\0\0") + 8
-    data[at : at + 4] = b"\xff\xff\xff\xff"  # the length of its numbers
+    struct.pack_into("<I", data, data.index(name) + after, length)
     path.write_bytes(data)
     read = judge_file(path, lambda path: read_mesh(path, TriangleMesh), legal=False)
     assert (read.outcome, read.fault) == (outcome, None)

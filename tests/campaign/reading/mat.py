@@ -11,6 +11,8 @@ from tests.campaign.reading.content import Content, Damaged, finite
 
 _TYPES = {1: "b", 2: "B", 3: "h", 4: "H", 5: "i", 6: "I", 7: "f", 9: "d", 12: "q", 13: "Q"}
 _MATRIX, _COMPRESSED = 14, 15
+#: A matrix begins with its flags, which always have eight bytes, whatever length is said.
+_FLAGS_END = 16
 #: mxDOUBLE_CLASS to mxUINT64_CLASS.
 _NUMERIC = range(6, 16)
 _LEVEL_4 = "dfihHB"
@@ -94,13 +96,15 @@ def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
 
 
 def _matrix(data: bytes, order: str) -> tuple[str, Table] | None:
-    elements = _elements(data, order)
-    head = list(islice(elements, 3))
-    if len(head) < 3 or len(head[0][1]) < 8 or len(head[1][1]) < 8 or head[1][0] != 5:
+    if len(data) < _FLAGS_END:
         return None
-    (flags,) = struct.unpack_from(order + "I", head[0][1])
-    name = head[2][1].decode("latin-1")
-    dimensions = struct.unpack(f"{order}{len(head[1][1]) // 4}i", head[1][1])
+    (flags,) = struct.unpack_from(order + "I", data, 8)
+    elements = _elements(data[_FLAGS_END:], order)
+    head = list(islice(elements, 2))
+    if len(head) < 2 or len(head[0][1]) < 8 or head[0][0] != 5:
+        return None
+    name = head[1][1].decode("latin-1")
+    dimensions = struct.unpack(f"{order}{len(head[0][1]) // 4}i", head[0][1])
     try:
         if flags & 0xFF not in _NUMERIC or flags & 0x0800 or len(dimensions) != 2:
             raise Damaged(f"{name} is not a matrix of real numbers")
