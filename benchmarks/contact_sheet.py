@@ -45,9 +45,9 @@ def contact_sheet() -> Section:
         axes.set_axis_off()
         axes.set_title(f"{name}\n{mesh.m:,} faces", fontsize=11, y=-0.12)
     figure.subplots_adjust(left=0, right=1, top=1, bottom=0.03, wspace=0, hspace=0.12)
-    picture = BytesIO()
-    figure.savefig(picture, format="png")
-    return Section([], files={"reports/surfaces/contact_sheet.jpg": picture.getvalue()})
+    buffer = BytesIO()
+    figure.savefig(buffer, format="png")
+    return Section([], files={"reports/surfaces/contact_sheet.jpg": buffer.getvalue()})
 
 
 def seen_from(view: Sequence[float], mesh: TriangleMesh) -> np.ndarray:

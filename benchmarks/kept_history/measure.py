@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cembench.core.atomic import write_text
+from cembench.core.atomic import write, write_text
 from cembench.mesh.files import read_mesh
 from cembench.registry import load_registry
 from cembench.running.environment import for_measuring
@@ -47,7 +47,7 @@ def write_surfaces(meshes: Path | None) -> None:
     write_text(known, json.dumps(hashes, indent=1) + "\n")
     SURFACES.mkdir(parents=True, exist_ok=True)
     for name, mesh in found.items():
-        np.savez(SURFACES / f"{name}.npz", V=mesh.V, F=mesh.F)
+        write(SURFACES / f"{name}.npz", lambda file, of=mesh: np.savez(file, V=of.V, F=of.F))
 
 
 def asv(*words: str) -> int:

@@ -578,7 +578,7 @@ def _check_together(asked: Mapping[str, Any]) -> None:
     usual = inspect.signature(benchmark).parameters
 
     def given(name: str) -> bool:
-        return asked[name] not in (None, (), [], usual[name].default)
+        return asked[name] not in (None, (), [], {}, usual[name].default)
 
     for one, other, why in _EXCLUDING:
         if given(one) and given(other):

@@ -9,7 +9,7 @@ import pytest
 
 import cembench
 from cembench.core.extras import MODULES, Extra, MissingExtra, command, missing, require
-from cembench.report.export import Format, export_rows
+from cembench.report.export import export_rows
 
 ROOT = Path(__file__).parents[2]
 #: Where the name of a module is not that of what is installed.
@@ -72,7 +72,7 @@ def fetching(folder):
 
 
 def parquet(folder):
-    export_rows([{"a": 1}], folder / "a.parquet", Format.parquet)
+    export_rows([{"a": 1}], folder / "a.parquet", "parquet")
 
 
 def a_stand_in(folder):

@@ -5,7 +5,7 @@ import pytest
 from pyarrow import parquet
 
 from cembench.core.errors import RecordError
-from cembench.report.export import Format, export_rows
+from cembench.report.export import export_rows
 from cembench.results.columns import row, rows
 from tests.records import record_of
 
@@ -29,8 +29,8 @@ def test_rows_compare_with_the_reference():
 
 def test_every_format_holds_every_row_and_column(tmp_path):
     exported = rows(RECORDS)
-    for form in Format:
-        export_rows(exported, tmp_path / form.value, form)
+    for form in ("csv", "parquet", "json"):
+        export_rows(exported, tmp_path / form, form)
     assert json.loads((tmp_path / "json").read_text()) == exported
     with (tmp_path / "csv").open(newline="") as file:
         lines = list(csv.DictReader(file))
@@ -45,4 +45,4 @@ def test_every_format_holds_every_row_and_column(tmp_path):
 def test_an_export_that_cannot_be_written_is_said(tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(RecordError, match="cannot be written"):
-        export_rows([row(RECORDS[0])], tmp_path / "file/rows.csv", Format.csv)
+        export_rows([row(RECORDS[0])], tmp_path / "file/rows.csv", "csv")

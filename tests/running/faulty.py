@@ -243,7 +243,7 @@ def kills_its_parent(mesh: DiskMesh) -> Parameterization:
 @algorithm("tells-where", title="Tells of its process", target="disk")
 def tells_where(mesh: DiskMesh) -> Parameterization:
     raise AlgorithmFailed(
-        f"{os.environ['GLIBC_TUNABLES']} {sys.argv[0]} {os.environ['OPENBLAS_NUM_THREADS']} "
+        f"{os.environ['GLIBC_TUNABLES']} {sys.argv[0]} {os.environ['OMP_NUM_THREADS']} "
         f"{os.getpgid(0) == os.getpid()} "
         f"{sorted(name for name in sys.modules if name.startswith('algorithms.'))} {len(later)}"
     )
