@@ -2,6 +2,7 @@
 
 import random
 import struct
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import numpy as np
@@ -113,6 +114,20 @@ def test_a_wrong_length_within_mat_counts_where_it_loses_something(
     path.write_bytes(data)
     read = judge_file(path, lambda path: read_mesh(path, TriangleMesh), legal=False)
     assert (read.outcome, read.fault) == (outcome, None)
+
+
+@pytest.mark.parametrize("wanted", [False, True])
+def test_a_compressed_variable_that_cannot_be_read_is_damage_if_it_is_wanted(wanted, tmp_path):
+    path = tmp_path / "a.mat"
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[1, 2, 3]], np.int32)
+    content = {"note": np.array([[1.0, 2.0]]), "v": V, "f": F}
+    savemat(path, content, do_compression=True)
+    data, at = bytearray(path.read_bytes()), 128
+    if wanted:
+        at += 8 + struct.unpack_from("<I", data, at + 4)[0]
+    data[at + 12] ^= 0xFF
+    with pytest.raises(Damaged) if wanted else nullcontext():
+        assert READERS[".mat"](bytes(data)).polygons == [(0, 1, 2)]
 
 
 def reading(change=lambda V, F: (V, F)):

@@ -24,7 +24,7 @@ def read_mat(data: bytes) -> Content:
     """Read v (n, 3) and f (m, 3), corners counted from 1, or the only two variables that fit."""
     # The text that opens level 5 has no zero in its first four bytes; a number of level 4 has.
     is_level_5 = 0 not in data[:4] or data[124:128] in (b"\0\1IM", b"\1\0MI")
-    by_name = dict(_level_5(data) if is_level_5 else _level_4(data))
+    by_name = _level_5(data) if is_level_5 else dict(_level_4(data))
     v, f = ("v", "f") if {"v", "f"} <= set(by_name) else _only_pair(by_name)
     points, polygons = [], []
     for row in by_name[v]:
@@ -48,29 +48,36 @@ def _only_pair(found: dict[str, Table]) -> tuple[str, str]:
     return pairs[0]
 
 
-def _level_5(data: bytes) -> Iterator[tuple[str, Table]]:
+def _level_5(data: bytes) -> dict[str, Table]:
     order = {b"IM": "<", b"MI": ">"}.get(data[126:128])
     if order is None:
         raise Damaged("neither of the two byte orders")
     (version,) = struct.unpack_from(order + "H", data, 124)
     if version != 0x0100:
         raise Damaged(f"version {version:#x}")
+    whole: dict[str, Table] = {}
+    lost = None
     for kind, body in _elements(data[128:], order):
-        content = body
-        if kind == _COMPRESSED:
-            try:
-                content = zlib.decompress(body)
-            except zlib.error as error:
-                raise Damaged(f"compressed data: {error}") from None
-            inner = list(_elements(content, order))
-            if len(inner) != 1 or inner[0][0] != _MATRIX:
-                raise Damaged("compressed data that is not one matrix")
-            content = inner[0][1]
-        elif kind != _MATRIX:
+        try:
+            content = _decompressed(body, order) if kind == _COMPRESSED else body
+        except Damaged as error:
+            lost = error
             continue
-        variable = _matrix(content, order)
-        if variable is not None:
-            yield variable
+        if kind in (_MATRIX, _COMPRESSED):
+            whole |= dict([found]) if (found := _matrix(content, order)) else {}
+    if lost and not {"v", "f"} <= set(whole):
+        raise lost  # who knows which variable it was
+    return whole
+
+
+def _decompressed(body: bytes, order: str) -> bytes:
+    try:
+        inner = list(_elements(zlib.decompress(body), order))
+    except zlib.error as error:
+        raise Damaged(f"compressed data: {error}") from None
+    if len(inner) != 1 or inner[0][0] != _MATRIX:
+        raise Damaged("compressed data that is not one matrix")
+    return inner[0][1]
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:
