@@ -10,12 +10,16 @@ READY  := $(VENV)/ready
 # Holds what `make reproduce` needs; an environment that is ready holds it too.
 LIGHT  := $(VENV)/ready-to-reproduce
 
-.PHONY: reproduce test test-slow lint types tests docs bench bench-kernels history fuzz stale refresh release-check test-matrix pins clean
+.PHONY: reproduce test test-pure test-slow lint types tests docs bench bench-kernels history fuzz stale refresh release-check test-matrix pins clean
 
 reproduce: $(LIGHT)
 	$(BIN)/cembench reproduce
 
 test: lint types tests
+
+# A minute or two: what needs no process, for changes of kernels, meshes and algorithms.
+test-pure: $(READY)
+	$(BIN)/python -m pytest -m "pure and not slow" -n auto --dist loadfile -q
 
 test-slow: $(READY)
 	$(BIN)/python -m pytest -m slow

@@ -1,5 +1,6 @@
 import gc
 import os
+import sys
 from functools import cache
 from pathlib import Path
 
@@ -40,6 +41,43 @@ LONG = (
     "report/test_html_browser.py",
     "sharing/test_results_repository.py",
 )
+
+
+#: What the tests of a room cost, unless one is marked otherwise; those of all other rooms start
+#: processes.
+COSTS = {
+    **dict.fromkeys(("algorithms", "conformal", "core", "drawing", "linear_algebra"), "pure"),
+    **dict.fromkeys(("mesh", "meshes_gen", "results"), "pure"),
+    **dict.fromkeys(("docs", "papers", "report", "sharing", "textures"), "product"),
+}
+#: What a test that is marked `pure` does not do.
+STARTS = ("os.fork", "os.forkpty", "os.posix_spawn", "os.system", "subprocess.Popen")
+
+
+def pytest_itemcollected(item):
+    """Mark what each test costs."""
+    if not any(item.get_closest_marker(name) for name in ("pure", "process", "product")):
+        room = Path(item.nodeid.partition("::")[0]).parts[1]
+        item.add_marker(COSTS.get(room, "process"))
+
+
+_in_pure = []
+
+
+@pytest.fixture(autouse=True)
+def pure_tests_start_no_process(request):
+    """Refuse a process to a pure test, whose mark would be wrong."""
+    _in_pure[:] = [request.node.nodeid] if request.node.get_closest_marker("pure") else []
+    yield
+    _in_pure.clear()
+
+
+def _refuse(event, arguments):
+    if _in_pure and event in STARTS:
+        raise RuntimeError(f"{_in_pure[0]} starts a process: mark it with pytest.mark.process")
+
+
+sys.addaudithook(_refuse)
 
 
 def pytest_collection_modifyitems(config, items):

@@ -161,6 +161,7 @@ with draft_folder(place) as folder:
 """
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("what", ["file", "folder"])
 def test_what_a_kill_left_is_cleared_by_the_next_write_of_the_same_file(what, tmp_path):
     ended = subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "a"), what], check=False)

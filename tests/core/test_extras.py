@@ -117,6 +117,7 @@ def test_the_command_line_says_it_before_it_measures(capsys, monkeypatch, tmp_pa
     assert not (tmp_path / "run").exists()
 
 
+@pytest.mark.process
 def test_without_cvxopt_superlu_factors():
     code = (
         "import sys; sys.modules['cvxopt'] = None\n"

@@ -86,6 +86,7 @@ def test_names_that_no_file_can_have(tmp_path):
     assert files_in(tmp_path / "none", "*") == []
 
 
+@pytest.mark.process
 def test_what_may_not_be_read_is_not_taken_for_empty(tmp_path):
     hidden = tmp_path / "hidden"
     hidden.mkdir()

@@ -82,6 +82,7 @@ def test_the_real_punctured_torus(cli):
     assert (code, "genus 1" in err) == (2, True)
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

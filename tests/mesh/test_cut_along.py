@@ -89,6 +89,7 @@ def test_a_file_without_texture_coordinates_has_no_seams(tmp_path):
         cembench.cut(tmp_path / "a.obj", along="uv")
 
 
+@pytest.mark.process
 def test_the_command_takes_a_file_of_seams_or_uv(tmp_path, cli):
     path = tmp_path / "a.obj"
     path.write_text(gallery.obj_text(*gallery.octahedron()))

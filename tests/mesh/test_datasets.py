@@ -30,6 +30,8 @@ from cembench.running.plan import Provenance, provenance_of
 from tests.limits import files_of_at_most, tree
 from tests.real_meshes import real_mesh
 
+pytestmark = pytest.mark.process
+
 
 def _mat():
     z, F = disk_grid(100)

@@ -149,6 +149,7 @@ def test_all_downloads_end_when_nobody_asks_for_more(server, tmp_path):
     assert sorted((tmp_path / "cache").rglob("*.mat")) == [here.path]
 
 
+@pytest.mark.process
 @pytest.mark.parametrize("way", ["silent", "trickling"])
 @pytest.mark.parametrize(("number", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
 def test_a_signal_ends_fetch_while_a_server_sends(server, tmp_path, way, number, code):

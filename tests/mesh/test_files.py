@@ -157,6 +157,7 @@ def mat(path, **variables):
     return path
 
 
+@pytest.mark.process
 def test_matlab_files_count_triangles_from_1(surface, tmp_path):
     path = mat(tmp_path / "a.mat", v=surface.V, f=(surface.F + 1).astype(float))
     again = read_mesh(path, TriangleMesh)
@@ -164,6 +165,7 @@ def test_matlab_files_count_triangles_from_1(surface, tmp_path):
     assert again.name == "a"
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("variables", "words"),
     [
@@ -180,12 +182,14 @@ def test_matlab_file_without_a_mesh(variables, words, tmp_path):
         read_mesh(mat(tmp_path / "a.mat", **variables))
 
 
+@pytest.mark.process
 def test_damaged_matlab_file(tmp_path):
     (tmp_path / "a.mat").write_text("hello")
     with pytest.raises(MeshError, match="cannot be read as MAT"):
         read_mesh(tmp_path / "a.mat")
 
 
+@pytest.mark.process
 def test_matlab_file_of_version_7_3_is_refused_with_the_remedy(tmp_path):
     header = b"MATLAB 7.3 MAT-file".ljust(116) + bytes(8) + b"\x00\x02IM"
     (tmp_path / "a.mat").write_bytes(header + bytes(512))

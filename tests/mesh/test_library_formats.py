@@ -10,6 +10,8 @@ from cembench.core.errors import MeshError
 from cembench.mesh.files import read_soup
 from tests import gallery
 
+pytestmark = pytest.mark.process
+
 pyvista = pytest.importorskip("pyvista")
 meshio = pytest.importorskip("meshio")
 trimesh = pytest.importorskip("trimesh")

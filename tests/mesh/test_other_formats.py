@@ -17,6 +17,8 @@ from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.formats import isolated
 from cembench.mesh.triangle_mesh import TriangleMesh
 
+pytestmark = pytest.mark.process
+
 
 @pytest.fixture(scope="module")
 def disk():

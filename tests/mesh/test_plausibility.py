@@ -94,6 +94,7 @@ def test_nothing_is_said_of_sound_surfaces():
         assert implausible(V, F) == ()
 
 
+@pytest.mark.process
 def test_the_notes_are_those_of_a_map_too(tmp_path):
     V, F = hill()
     V = V * [0.5, 0.4, 3000] + [7.2, 46.3, 500]

@@ -340,6 +340,7 @@ def test_lines_that_are_not_obj_are_reported(text, tmp_path):
     assert notice.text.endswith(f"OBJ were ignored: 1, the first: line 6, {text.strip()!r}")
 
 
+@pytest.mark.process
 @pytest.mark.usefixtures("forked_readers")
 def test_matlab_files_cut_anywhere_are_refused(tmp_path):
     for compressed in (False, True):
@@ -359,6 +360,7 @@ def test_matlab_files_cut_anywhere_are_refused(tmp_path):
             assert soup.corners.tolist() == np.ravel(TRIANGLES).tolist()
 
 
+@pytest.mark.process
 def test_a_matlab_file_cut_within_a_variable_that_nobody_wants_is_refused(tmp_path):
     arrays = {"v": POINTS, "f": np.array(TRIANGLES) + 1.0, "name": "text"}
     savemat(tmp_path / "a.mat", arrays)
@@ -367,6 +369,7 @@ def test_a_matlab_file_cut_within_a_variable_that_nobody_wants_is_refused(tmp_pa
         read_soup(tmp_path / "a.mat")
 
 
+@pytest.mark.process
 def test_matlab_files_of_version_4_are_refused_with_the_remedy(tmp_path):
     savemat(tmp_path / "a.mat", {"v": POINTS, "f": np.array(TRIANGLES) + 1.0}, format="4")
     with pytest.raises(MeshError, match=r"version 4 are not supported.*'-v7'"):

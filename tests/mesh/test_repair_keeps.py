@@ -298,6 +298,7 @@ def klein_bottle(rows, columns):
     return V, np.concatenate([np.stack([a, b, d], 1), np.stack([a, d, c], 1)])
 
 
+@pytest.mark.process
 def test_map_drops_stray_vertices_with_a_note_and_keeps_the_file(tmp_path):
     V, F = gallery.flat_rectangle(4, 5)
     text = "# mine\n" + gallery.obj_text(np.vstack([[9, 9, 9], V, [7, 7, 7]]), F + 1)

@@ -17,6 +17,8 @@ from cembench.mesh.files import read_mesh, read_soup, write_mesh
 from cembench.mesh.triangle_mesh import TriangleMesh
 from cembench.mesh.uvs import read_uv
 
+pytestmark = pytest.mark.process
+
 #: Bytes that each bomb unpacks to, and that may be free in these tests.
 SIZE, FREE = 48 * 2**20, 2**20
 

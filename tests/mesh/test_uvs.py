@@ -58,6 +58,7 @@ def test_a_text_gives_the_uv_of_each_corner(tmp_path, name):
     assert np.array_equal(uv_of_corners(read_uv(tmp_path / name), V, F), Z[F])
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     "arrays", [{"uv": UV}, {"uv": Z}, {"uv": Z[F].ravel(), "fuv": [[0, 1, 2], [3, 4, 5]]}]
 )
@@ -87,6 +88,7 @@ def test_a_flattened_surface_has_its_uvs_in_its_vertices(tmp_path):
         read_flat(tmp_path / "b.off")
 
 
+@pytest.mark.process
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [

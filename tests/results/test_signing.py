@@ -12,9 +12,12 @@ from cembench.results.store import Store, read_record
 from tests.records import changed
 from tests.report.small_run import write_koebe, write_run
 
-pytestmark = pytest.mark.skipif(
-    shutil.which("ssh-keygen") is None, reason="NOT CHECKED: there is no ssh-keygen"
-)
+pytestmark = [
+    pytest.mark.process,
+    pytest.mark.skipif(
+        shutil.which("ssh-keygen") is None, reason="NOT CHECKED: there is no ssh-keygen"
+    ),
+]
 
 
 @pytest.fixture(scope="module")

@@ -121,6 +121,7 @@ def test_samples_that_cannot_be_written_are_said(record, tmp_path):
         Store(tmp_path).samples(record.cell, "e").save_round(0, record.outcome.rounds[0])
 
 
+@pytest.mark.process
 def test_a_lock_is_held_by_one_and_what_a_killed_run_left_is_cleared(tmp_path):
     store = Store(tmp_path / "run")
     assert not store.is_locked()
