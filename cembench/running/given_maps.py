@@ -14,7 +14,7 @@ from typing import get_args
 
 import numpy as np
 
-from cembench.conformal.planar import fitted_circle
+from cembench.conformal.metrics import circle_of
 from cembench.core.arrays import Complex
 from cembench.core.errors import MeshError, ParameterError
 from cembench.core.program import MapFiles
@@ -121,17 +121,12 @@ def kind_of(mesh: TriangleMesh, corners: Complex) -> Target:
         return "atlas"
     if not mesh.loops:
         return "atlas"
-    round_ones = [_is_circle(uv[loop]) for loop in mesh.loops]
+    circles = [circle_of(loop, uv[loop]) for loop in mesh.loops]
+    round_ones = [circle.circularity <= MapFiles.circle for circle in circles]
     outer = int(np.argmax([np.ptp(uv[loop].real) for loop in mesh.loops]))
     if isinstance(mesh, HoledMesh) and round_ones[outer]:
         return "circular holes" if all(round_ones) else "disk with holes"
     return "disk" if isinstance(mesh, DiskMesh) and round_ones[0] else "free boundary"
-
-
-def _is_circle(z: Complex) -> bool:
-    centre, radius = fitted_circle(z)
-    off = np.abs(np.abs(z - centre) - radius).max()
-    return bool(off <= MapFiles.circle * radius)
 
 
 def _common(name: str, kinds: dict[Path, Target], reporter: Reporter) -> Target:
