@@ -158,7 +158,7 @@ UV_METRICS: tuple[Metric, ...] = (
         lambda f: len(np.unique(_uv(f).tiles)), better=None,
     ),
     Metric(
-        "covered_share", "covered", "", "of the tiles", ".2f", ".2f",
+        "covered_share", "covered", "", "of the tiles", ".3g", ".3g",
         "share of the tiles that is covered",
         lambda f: (_uv(f).layers[1] - _uv(f).layers[2]) / len(np.unique(_uv(f).tiles)),
         better=None,

@@ -8,6 +8,7 @@ from cembench.algorithms.best.choice import Candidate, best_of
 from cembench.algorithms.best.disk import CANDIDATES, best
 from cembench.algorithms.best.holes import CANDIDATES as OF_HOLES
 from cembench.algorithms.best.holes import best_holes
+from cembench.algorithms.cetm.flips import cetm_flips
 from cembench.surfaces.catalogue import nefertiti
 from cembench.surfaces.holed_disk import holed_disk
 from cembench.surfaces.sheets import swiss_roll
@@ -17,7 +18,9 @@ import cembench.conformal
 from cembench import AlgorithmFailed, Parameterization
 from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.even_weights import evened
+from cembench.conformal.graded_meshes import USUAL_STEPS
 from cembench.conformal.metrics import angle_errors, flipped_triangles
+from tests.conformal.test_even_weights import graded
 from tests.hard_surfaces import hard_surface
 
 
@@ -44,6 +47,15 @@ def test_it_is_as_good_as_the_best_candidate(mesh):
     np.testing.assert_array_equal(result.uv, uv)
     assert error_of(mesh, uv) <= 1.01**2 * min(errors_of(result))
     assert not flipped_triangles(mesh, result.uv)
+
+
+def test_on_a_graded_mesh_all_candidates_have_taken_even_steps():
+    mesh = graded(decades=3)
+    own = cetm_flips(mesh).uv
+    after = error_of(mesh, evened(mesh, own, USUAL_STEPS)[0])
+    assert after < 0.999 * error_of(mesh, own)
+    tried = best(mesh).extras["tried"]["cetm-flips"]
+    assert tried["angle_error_mean_deg"] == pytest.approx(after, rel=1e-12)
 
 
 def test_with_holes_it_is_as_good_as_the_best_candidate():
