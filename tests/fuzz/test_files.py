@@ -79,6 +79,9 @@ property float z
 property uchar red\nelement face 1\nproperty list uchar int vertex_indices\nproperty float quality
 end_header\n0 0 0 300\n1 0 0 1.5\n0 1 0 nan\n3 0 1 2 1e400\n"""
 
+STL = """solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0
+endloop\nendfacet\nendsolid a\n"""
+
 
 @pytest.mark.parametrize(
     ("suffix", "text"),
@@ -86,6 +89,8 @@ end_header\n0 0 0 300\n1 0 0 1.5\n0 1 0 nan\n3 0 1 2 1e400\n"""
         (".obj", SQUARE.replace("v 1 0 0", "v\t1\v0\f0")),
         (".off", "COFF\n3 1 0\n0 0 0 1\n1 0 0 nan\n0 1 0 1e400\n3 0 1 2 -inf\n"),
         (".ply", PLY),
+        (".ply", PLY.replace("1 0 0 1.5", "1\f0\v0 1.5")),
+        (".stl", STL.replace("1 0 0", "1\f0\v0")),
     ],
 )
 def test_what_nobody_reads_and_any_white_space_is_no_damage(suffix, text, tmp_path):
@@ -101,6 +106,7 @@ def test_what_nobody_reads_and_any_white_space_is_no_damage(suffix, text, tmp_pa
         (b"note", 8, 2**32 - 1, "mesh"),  # of numbers that nobody reads
         (b"v\0\0\0", -32, 10, "mesh"),  # of flags, which always have eight bytes
         (b"f\0\0\0", 8, 2**32 - 1, "refused"),
+        (b"f\0\0\0", -12, 2**32 - 1, "refused"),  # -1 rows, which a reader could make fit
     ],
 )
 def test_a_wrong_length_within_mat_counts_where_it_loses_something(

@@ -33,6 +33,8 @@ def read(path: Path, arrays: tuple[str, str] | None = None, *, uv: bool = False)
         others = [name for name, shape in shapes.items() if shape[1:] in ((2,), (3,))]
         chosen = wanted if uv or arrays or set(wanted) <= set(shapes) else (*wanted, *others)
         found = loadmat(path, appendmat=False, variable_names=chosen) if shapes else {}
+    if any(min(shapes[name], default=0) < 0 for name in found if name in shapes):
+        raise damaged("it cannot be read as MAT: a variable has a negative number of rows")
     if version != 1:
         raise MeshError(
             f"MATLAB files of version {'7.3' if version else '4'} are not supported. In MATLAB, "

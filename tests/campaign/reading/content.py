@@ -12,6 +12,12 @@ _NOT_FINITE = re.compile(r"[+-]?(nan|inf(inity)?)", re.IGNORECASE)
 _REAL = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
 
 
+def lines_of(data: bytes) -> list[list[str]]:
+    """Return the words of each line that has some; only ASCII's white space parts them."""
+    words = [[word.decode("latin-1") for word in line.split()] for line in data.splitlines()]
+    return [line for line in words if line]
+
+
 class Damaged(Exception):  # noqa: N818 - it is what the reader finds, not a mistake of its own
     """The file breaks its format's specification; the message says where."""
 

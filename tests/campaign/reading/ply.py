@@ -7,7 +7,7 @@ import struct
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from tests.campaign.reading.content import Content, Damaged, finite, integer, unread
+from tests.campaign.reading.content import Content, Damaged, finite, integer, lines_of, unread
 
 _SIZES = {
     **dict.fromkeys(("char", "int8"), "b"),
@@ -131,7 +131,7 @@ def _row(properties: list[_Property], take: Take, room: Callable[[], int]) -> Ro
 
 
 def _text(elements: list[_Element], body: bytes) -> dict[str, list[Row]]:
-    lines = [words for line in body.decode("latin-1").splitlines() if (words := line.split())]
+    lines = lines_of(body)
     needed = sum(element.count for element in elements if element.properties)
     if len(lines) != needed:
         raise Damaged(f"{len(lines)} lines, declared are {needed}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import struct
 
-from tests.campaign.reading.content import Content, Damaged, Point, finite, real
+from tests.campaign.reading.content import Content, Damaged, Point, finite, lines_of, real
 
 
 def read_stl(data: bytes) -> Content:
@@ -38,7 +38,7 @@ def _binary(data: bytes) -> list[tuple[Point, ...]]:
 
 
 def _text(data: bytes) -> list[tuple[Point, ...]]:
-    lines = [words for line in data.decode("latin-1").splitlines() if (words := line.split())]
+    lines = lines_of(data)
     keywords = [words[0].lower() for words in lines]
     if keywords[-1] != "endsolid":
         raise Damaged("it does not end with endsolid")
