@@ -14,7 +14,8 @@ import numpy as np
 import scipy
 
 from cembench.conformal.metrics import angle_errors, flipped_triangles
-from cembench.core.arrays import Complex, Real
+from cembench.conformal.planar import turns
+from cembench.core.arrays import Complex, Indices, Real
 from cembench.core.clock import phase
 from cembench.core.errors import NotPositiveDefinite
 from cembench.linear_algebra.cholesky import Cholesky
@@ -33,8 +34,8 @@ HALVINGS = 6
 def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
     """Return a map to the disk with a smaller mean angle error, and the number of steps taken.
 
-    Each step lowers the mean angle error, by a share of :data:`MIN_GAIN` at least, and folds no
-    more triangles; the boundary stays on the circle, in order.
+    Each step lowers the mean angle error, by a share of :data:`MIN_GAIN` at least, and has no more
+    folds or backward arcs than before; the boundary stays on the circle.
 
     Parameters
     ----------
@@ -64,12 +65,11 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
     with phase("assembly"):
         gradient = _gradients(mesh)
         rows, columns = np.repeat(np.arange(mesh.m), 3), mesh.F.ravel()
-        shape = mesh.m, mesh.n
         f_z, f_zbar = (
-            scipy.sparse.csr_array(((one / 2).ravel(), (rows, columns)), shape=shape)
+            scipy.sparse.csr_array(((one / 2).ravel(), (rows, columns)), shape=(mesh.m, mesh.n))
             for one in (np.conj(gradient), gradient)
         )
-        folds, error = flipped_triangles(mesh, uv), float(angle_errors(mesh, uv).mean())
+        faults, error = _faults(mesh, uv), float(angle_errors(mesh, uv).mean())
     for taken in range(steps):
         with phase("assembly"), np.errstate(divide="ignore", invalid="ignore"):
             growth = np.abs(f_z @ uv)
@@ -85,12 +85,17 @@ def evened(mesh: DiskMesh, uv: Complex, steps: int) -> tuple[Complex, int]:
         for halved in range(HALVINGS):
             tried = _moved(mesh, uv, step / 2**halved)
             new = float(angle_errors(mesh, tried).mean())
-            if new < (1 - MIN_GAIN) * error and flipped_triangles(mesh, tried) <= folds:
+            if new < (1 - MIN_GAIN) * error and (_faults(mesh, tried) <= faults).all():
                 break
         else:
             return uv, taken
         uv, error = tried, new
     return uv, steps
+
+
+def _faults(mesh: DiskMesh, uv: Complex) -> Indices:
+    """Return the number of folds, and of arcs of the boundary that go backward."""
+    return np.array([flipped_triangles(mesh, uv), turns(uv[mesh.boundary])[2]])
 
 
 def _gradients(mesh: DiskMesh) -> Complex:
@@ -105,8 +110,7 @@ def _gradients(mesh: DiskMesh) -> Complex:
     foot = np.einsum("td,td->t", c - a, x)
     height = np.linalg.norm(c - a - foot[:, None] * x, axis=1)
     w = np.stack([0 * along, along, foot + 1j * height], axis=1)
-    opposite = np.roll(w, -2, axis=1) - np.roll(w, -1, axis=1)
-    return 1j * opposite / (along * height)[:, None]
+    return 1j * (np.roll(w, -2, axis=1) - np.roll(w, -1, axis=1)) / (along * height)[:, None]
 
 
 def _step(mesh: DiskMesh, uv: Complex, D: scipy.sparse.csr_array) -> Real:

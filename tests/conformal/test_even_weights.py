@@ -2,16 +2,19 @@
 
 import numpy as np
 import pytest
+from cembench.algorithms.cetm.flips import cetm_flips
 from cembench.algorithms.direct_cem.disk import direct_cem
 from cembench.surfaces.flat_disk import flat_disk
 
 from cembench import DiskMesh
+from cembench.conformal.angle_gauge import angle_gauge
 from cembench.conformal.beltrami import beltrami_coefficients
 from cembench.conformal.even_weights import _gradients, evened
 from cembench.conformal.graded_meshes import is_graded
 from cembench.conformal.metrics import angle_errors, flipped_triangles, is_disk_map
 from cembench.conformal.planar import turns
 from tests import gallery
+from tests.campaign.hard_meshes import hard_mesh
 from tests.hard_surfaces import hard_surface
 
 
@@ -68,3 +71,11 @@ def test_a_conformal_map_stays():
     uv, taken = evened(mesh, z, 5)
     assert taken == 0
     np.testing.assert_array_equal(uv, z)
+
+
+def test_no_step_lets_an_arc_of_the_boundary_go_backward():
+    _, V, F = hard_mesh(6, 2160)
+    mesh = DiskMesh.from_arrays(V, F)
+    uv, taken = evened(mesh, angle_gauge(mesh, cetm_flips(mesh).uv), 10)
+    assert taken
+    assert turns(uv[mesh.boundary])[2] == 0
