@@ -27,7 +27,7 @@ def map_seconds(
 ) -> Section:
     """Measure what a user waits for: `map` as a whole process, and the call in Python.
 
-    Surfaces are hemi-ellipsoids, the algorithm is direct-cem, and `map` writes what it reads, with
+    Surfaces are hemi-ellipsoids, the map is the default one, and `map` writes what it reads, with
     UVs. All of a round's measurements follow one another.
     """
     load = psutil.getloadavg()[0]
