@@ -41,7 +41,7 @@ docs: $(READY)
 bench: $(READY)
 	$(BIN)/python -m benchmarks limit 276000 1690000
 
-# Measures what the kept history lacks, about 45 s a commit, and writes its page. HISTORY="--meshes ../shared/meshes" and the like.
+# Measures what the kept history lacks, about 40 s a commit, and writes its page. HISTORY="--meshes ../shared/meshes" and the like.
 history: $(READY)
 	$(BIN)/python -m benchmarks.kept_history.measure $(HISTORY)
 
