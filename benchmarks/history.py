@@ -45,7 +45,7 @@ def history(*, machine: str = "reference") -> Section:
     fastest = ", ".join(f"{name} {times[name]:.1f}" for name in sorted(times, key=times.get))
     head = (
         f"From the first of {len(found)} commits that has it to the last, each algorithm became "
-        f"this many times faster: {fastest}."
+        f"this many times as fast: {fastest}."
     )
     picture = "![Milliseconds of algorithms and of shared steps by commit](history.png)"
     rows = changes(maps | steps, list(found), STEP, "ms")
