@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import re
 import textwrap
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -207,8 +208,10 @@ def _font(pixels: float, *, bold: bool) -> ImageFont.FreeTypeFont:
 
 
 def _broken(text: str, lines: int) -> list[str]:
-    """Break a text into this many lines of similar length."""
+    """Break a text into this many lines of similar length; groups parted by spaces stay whole."""
+    groups = "   " in text
+    text = re.sub(r"(?<! ) (?! )", "\u00a0", text) if groups else text
     length = -(-len(text) // lines)
-    while len(parts := textwrap.wrap(text, length)) > lines:
+    while len(parts := textwrap.wrap(text, length, break_long_words=not groups)) > lines:
         length += 1
     return parts or [text]

@@ -139,6 +139,13 @@ def test_long_words_stay_on_the_page(tmp_path):
     assert (picture[compose.panel_gap(SMALL) + compose.panel_side(SMALL) :] < 200).any()
 
 
+def test_a_figure_is_not_parted_from_its_name():
+    one, other = compose._broken("angle error 1.64 degrees   folded triangles 0", 2)
+    assert one.split() == ["angle", "error", "1.64", "degrees"]
+    assert other.split() == ["folded", "triangles", "0"]
+    assert compose._broken("a long title of four", 2) == ["a long title", "of four"]
+
+
 def test_a_picture_that_cannot_be_drawn_is_an_error(tmp_path, monkeypatch):
     def fail(mesh, uv, side):
         raise MemoryError("no room")
