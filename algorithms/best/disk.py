@@ -70,8 +70,8 @@ def best(
     (`even_steps`). `work` limits the triangles mapped, in the time that direct-cem takes for one:
     algorithms and steps that exceed it are left out, by the size of the surface alone, so that the
     same surface always has the same map. `chosen` names the algorithm, `tried` has the mean angle
-    error, in degrees, and the texel density ratio of each, before all this but two even steps on
-    graded meshes, which direct-cem takes by itself.
+    error, in degrees, and the texel density ratio of each before all this, but on graded meshes
+    after the two such steps that direct-cem takes by itself.
     """
     chosen = best_of(mesh, [CANDIDATES], work, repair=repair)
     most = min(MAX_STEPS, int(work / (STEP * mesh.m)))
