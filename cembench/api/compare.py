@@ -8,6 +8,7 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -28,20 +29,8 @@ USUAL_ROUNDS = 10
 USUAL_SURFACES = ("cone", "hemi-ellipsoid", "cylinder-sheet")
 USUAL_FACES = 5000
 
-
-@dataclass(frozen=True)
-class Version:
-    """A version of solvers.
-
-    `about` says which one it is, and `python` is its interpreter. Its code is in `folder`, unless
-    it is installed.
-    """
-
-    name: str
-    about: str
-    python: str
-    folder: str = ""
-    plugins: tuple[str, ...] = ()
+#: What relays need to know of each version, by its label, the earlier one first.
+Versions = dict[str, dict[str, Any]]
 
 
 @dataclass(frozen=True)
@@ -196,10 +185,9 @@ def compare_versions(
     with tempfile.TemporaryDirectory(prefix="cembench-") as place, ExitStack() as stack:
         with reporter.busy("preparing both versions"):
             versions = _versions(before, after, env, plugins, Path(place), stack)
-            wanted = [(name, version) for name in algorithms for version in versions]
             relays = [
-                Relay(f"{name}@{one.name}", one.python, name, one.about, one.folder, one.plugins)
-                for name, one in wanted
+                Relay(f"{name}@{label}", solver=name, **about)
+                for name, (label, about) in product(algorithms, versions.items())
             ]
             source = "\n".join(declared(number, one) for number, one in enumerate(relays))
         plugin = Path(place) / "solvers_of_versions.py"
@@ -224,19 +212,18 @@ def compare_versions(
     return _compared(run, algorithms, versions)
 
 
-def _compared(run: Run, algorithms: Sequence[str], versions: Sequence[Version]) -> VersionsCompared:
+def _compared(run: Run, algorithms: Sequence[str], versions: Versions) -> VersionsCompared:
     """Return what the records of a run say of two versions."""
     from cembench.results.columns import row
     from cembench.results.comparison import compare
     from cembench.results.runs_compared import Change
     from cembench.validation.quality import compare_speed
 
-    old, new = versions
     cells, changes, whole = [], [], []
     for name in algorithms:
         earlier, later = (
-            {r.cell.mesh_hash: r for r in run.asked if r.cell.algorithm == f"{name}@{one.name}"}
-            for one in (old, new)
+            {r.cell.mesh_hash: r for r in run.asked if r.cell.algorithm == f"{name}@{label}"}
+            for label in versions
         )
         pairs = [(later[key], earlier[key]) for key in earlier if key in later]
         for lost in (row(earlier[key]) for key in earlier if key not in later):
@@ -250,7 +237,8 @@ def _compared(run: Run, algorithms: Sequence[str], versions: Sequence[Version]) 
         if len(pairs) > 1 and (over_all := compare_speed(pairs)) is not None:
             about = {"mesh": "all surfaces", "algorithm": name, "solves": "", "seconds": None}
             whole.append(Change(about, about, over_all))
-    return VersionsCompared(run, (old.about, new.about), tuple(cells), (*changes, *whole))
+    before, after = (about["version"] for about in versions.values())
+    return VersionsCompared(run, (before, after), tuple(cells), (*changes, *whole))
 
 
 def _versions(
@@ -260,7 +248,7 @@ def _versions(
     plugins: Sequence[str],
     place: Path,
     stack: ExitStack,
-) -> list[Version]:
+) -> Versions:
     """Return the two versions that a user names; what they need is removed with the stack."""
     named = [one for one in (before, after) if one is not None]
     if len(env or named) != 2 or (env and named):
@@ -269,29 +257,22 @@ def _versions(
             "by `env`."
         )
     if env:
-        files = tuple(_absolute(one) for one in plugins)
-        return [
-            Version(name, f"{name} ({path})", str(path), plugins=files)
-            for name, path in env.items()
-        ]
-    labels = ("before", "after")
-    if all(one.endswith(".py") for one in named):
-        return [
-            Version(label, one, sys.executable, plugins=tuple(map(_absolute, (*plugins, one))))
-            for label, one in zip(labels, named, strict=True)
-        ]
-    commits = [_commit(one) for one in named]
-    inside = _git("rev-parse", "--show-prefix")
-    return [
-        Version(
-            label,
-            f"{ref} ({commit[:12]})",
-            sys.executable,
-            str(stack.enter_context(_worktree(commit, place / label)) / inside),
-            tuple(plugins),
-        )
-        for label, ref, commit in zip(labels, named, commits, strict=True)
-    ]
+        files = tuple(map(_absolute, plugins))
+        return {
+            label: {"version": f"{label} ({path})", "python": str(path), "plugins": files}
+            for label, path in env.items()
+        }
+    found: Versions = {}
+    for label, one in zip(("before", "after"), named, strict=True):
+        found[label] = {"version": one, "python": sys.executable}
+        if one.endswith(".py"):
+            found[label]["plugins"] = tuple(map(_absolute, (*plugins, one)))
+            continue
+        commit, inside = _commit(one), _git("rev-parse", "--show-prefix")
+        folder = stack.enter_context(_worktree(commit, place / label)) / inside
+        about = {"version": f"{one} ({commit[:12]})", "folder": str(folder)}
+        found[label] |= about | {"plugins": tuple(plugins)}
+    return found
 
 
 def _absolute(plugin: str) -> str:

@@ -35,11 +35,6 @@ COMPARABLE = 0.95
 ISLANDS, WHOLE = "the same islands", "the surface without seams"
 #: Overlaps of this share of the image are of rounding, or of single folds.
 ROUNDING = 1e-6
-#: Where images overlap.
-OVERLAPS = {
-    "overlap_inside_islands": "inside islands",
-    "overlap_between_islands": "between islands",
-}
 
 
 @dataclass(frozen=True)
@@ -186,18 +181,17 @@ def _mapped(mesh: TriangleMesh, piece: Indices, areas: Real) -> Best | None:
     )
 
 
-def _overlap(share: float | None, where: str) -> str:
-    if share is None:
-        return f"overlaps {where} cannot be told"
-    return f"{100 * share:.2g} % of the image overlaps {where}" if share > ROUNDING else ""
+def _overlap(m: Mapping[str, float | int | None], where: str) -> str:
+    if (share := m[f"overlap_{where}_islands"]) is None:
+        return f"overlaps {where} islands cannot be told"
+    return f"{100 * share:.2g} % of the image overlaps {where} islands" if share > ROUNDING else ""
 
 
 def _coverage(m: Mapping[str, float | int | None], islands: int) -> str:
     """Return how much of the texture is used; where it repeats, a share would say nothing."""
     if beyond := m["islands_beyond_their_tile"]:
-        return (
-            f"{beyond} of {counted(islands, 'island')} beyond one tile, where the texture repeats"
-        )
+        of = counted(islands, "island")
+        return f"{beyond} of {of} beyond one tile, where the texture repeats"
     if m["covered_share"] is None:
         return ""
     tiles = m["tiles"] or 1
@@ -212,7 +206,7 @@ def _sentence(found: Measurement) -> str:
         counted(found.cut.islands, "island"),
         f"mean angle error {m['angle_error_mean_deg'] or 0:.2f} degrees",
         counted(int(folds), "fold") if (folds := m["flipped_triangles"]) else "no folds",
-        *(_overlap(m[name], where) for name, where in OVERLAPS.items()),
+        *(_overlap(m, where) for where in ("inside", "between")),
         texture_words(m),
         _coverage(m, found.cut.islands),
     ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
+from itertools import product
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -97,16 +98,11 @@ def _checks(
     """Yield a check for each kind of regression of each algorithm on each surface."""
     from cembench.report.junit import Check
 
-    places = {(after["algorithm"], after["mesh"]): None for _, after in cells}
-    places |= {(one.algorithm, one.surface): None for one in bad}
-    for kind in kinds:
-        for algorithm, surface in places:
-            here = [
-                one.detail
-                for one in bad
-                if (one.kind, one.algorithm, one.surface) == (kind, algorithm, surface)
-            ]
-            yield Check(f"not {kind}", algorithm, surface, "; ".join(here) if here else None)
+    places = [(after["algorithm"], after["mesh"]) for _, after in cells]
+    places += [(one.algorithm, one.surface) for one in bad]
+    for kind, (name, surface) in product(kinds, dict.fromkeys(places)):
+        here = [x.detail for x in bad if (x.kind, x.algorithm, x.surface) == (kind, name, surface)]
+        yield Check(f"not {kind}", name, surface, "; ".join(here) or None)
 
 
 def _show_versions(found: Any, *, as_json: bool) -> None:

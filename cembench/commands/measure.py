@@ -80,8 +80,6 @@ def _show(found: Measurement, *, verbose: bool) -> None:
         out.print(f"{metric.title:<28} {text} {metric.unit}".rstrip())
     for place in found.worst:
         where = ", ".join(f"{x:.4g}" for x in place.position)
-        out.print(
-            f"worst: triangle {place.triangle} (island {place.island}) at ({where}): "
-            f"dilatation {place.dilatation:.3g}, angles off by up to {place.angle_error_deg:.1f}",
-            soft_wrap=True,
-        )
+        at = f"triangle {place.triangle} (island {place.island}) at ({where})"
+        off = f"dilatation {place.dilatation:.3g}, angles off by up to {place.angle_error_deg:.1f}"
+        out.print(f"worst: {at}: {off}", soft_wrap=True)

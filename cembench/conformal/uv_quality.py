@@ -37,7 +37,7 @@ class Place:
         Its number, counted from 0.
     island : int
         That of its island.
-    position : tuple of float
+    position : tuple of 3 floats
         Its centre on the surface.
     dilatation : float
         Ratio of its largest to its smallest stretch; infinite if it has collapsed.
@@ -47,7 +47,7 @@ class Place:
 
     triangle: int
     island: int
-    position: tuple[float, float, float]
+    position: tuple[float, ...]
     dilatation: float
     angle_error_deg: float
 
@@ -180,7 +180,7 @@ def by_island(figures: UvFigures) -> list[dict[str, Any]]:
     cut, total = figures.cut, figures.total
     images, areas = total(np.abs(figures.image_areas)), total(figures.areas)
     triangles = np.bincount(cut.island, minlength=cut.islands)
-    tile = figures.tiles
+    tiles = figures.tiles.view(np.float64).reshape(-1, 2).astype(int).tolist()
     each = {
         "triangles": triangles,
         "surface_share": areas / areas.sum(),
@@ -190,15 +190,10 @@ def by_island(figures: UvFigures) -> list[dict[str, Any]]:
         "texel_density": np.sqrt(images / areas / (figures.whole / areas.sum())),
         "overlap": figures.layers[0] / images,
         "mirrored": cut.turned,
-        "tile": [_udim(int(one.real), int(one.imag)) for one in tile],
+        "tile": [1001 + u + 10 * v if 0 <= u < 10 and v >= 0 else None for u, v in tiles],
     }
     columns = [np.asarray(values).tolist() for values in each.values()]
     return [dict(zip(each, row, strict=True)) for row in zip(*columns, strict=True)]
-
-
-def _udim(u: int, v: int) -> int | None:
-    """Return the number of a tile; None for one that has none."""
-    return 1001 + u + 10 * v if 0 <= u < 10 and v >= 0 else None
 
 
 def _outlines(cut: CutMap) -> tuple[Complex, Complex, Indices]:
@@ -234,20 +229,11 @@ def worst_places(figures: AtlasFigures) -> tuple[Place, ...]:
     centres = mesh.V[mesh.F].mean(axis=1)
     least = APART * float(np.linalg.norm(np.ptp(mesh.V, axis=0)))
     places: list[int] = []
-    left = np.ones(mesh.m, dtype=bool)
-    for k in np.argsort(-figures.dilatations, kind="stable"):
-        if left[k]:
-            places.append(int(k))
-            left &= np.linalg.norm(centres - centres[k], axis=1) > least
-        if len(places) == PLACES or not left.any():
-            break
-    return tuple(
-        Place(
-            k,
-            int(figures.cut.island[k]),
-            (float(centres[k, 0]), float(centres[k, 1]), float(centres[k, 2])),
-            float(figures.dilatations[k]),
-            float(figures.angle_errors[k].max()),
-        )
-        for k in places
-    )
+    left = np.argsort(-figures.dilatations, kind="stable")
+    while len(left) and len(places) < PLACES:
+        places.append(int(left[0]))
+        left = left[np.linalg.norm(centres[left] - centres[left[0]], axis=1) > least]
+    errors = figures.angle_errors.max(axis=1)
+    columns = (figures.cut.island, centres, figures.dilatations, errors)
+    rows = zip(places, *(column[places].tolist() for column in columns), strict=True)
+    return tuple(Place(k, island, tuple(at), *worst) for k, island, at, *worst in rows)

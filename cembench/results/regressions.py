@@ -42,11 +42,10 @@ class Regression:
 
 def check_kinds(kinds: Iterable[str]) -> None:
     """Raise :class:`ParameterError` unless all are kinds of regressions."""
+    known = get_args(FailOn)
     for kind in kinds:
-        if kind not in get_args(FailOn):
-            raise ParameterError(
-                f"fail_on: {unknown('kind of regression', kind, get_args(FailOn))}"
-            )
+        if kind not in known:
+            raise ParameterError(f"fail_on: {unknown('kind of regression', kind, known)}")
 
 
 def figures_of(row: Row, other: Row) -> dict[str, float]:

@@ -71,10 +71,8 @@ def given_maps(
         files[mesh.hash] = path.absolute()
         kinds[path] = kind_of(mesh, corners)
     if not files:
-        raise ParameterError(
-            f"{where} has no map of a surface of this run. "
-            + (strangers[0] if strangers else "It has no file of a mesh with UVs.")
-        )
+        why = strangers[0] if strangers else "It has no file of a mesh with UVs."
+        raise ParameterError(f"{where} has no map of a surface of this run. {why}")
     for text in strangers:
         reporter.warn(text)
     kind = target or _common(name, kinds, reporter)

@@ -52,7 +52,7 @@ class Relay:
     version: str
     folder: str = ""
     plugins: tuple[str, ...] = ()
-    _process: subprocess.Popen[str] | None = field(default=None, init=False)
+    _process: Any = field(default=None, init=False)
     _exchange: Path = field(default=Path(), init=False)
     _open: ExitStack = field(default_factory=ExitStack, init=False)
 
@@ -70,10 +70,9 @@ class Relay:
         """
         asked = {"name": self.solver, "folder": self.folder, "plugins": self.plugins}
         words = [self.python, "-P", str(SERVER), json.dumps(asked)]
+        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         try:
-            self._process = subprocess.Popen(
-                words, stdin=subprocess.PIPE, stdout=subprocess.PIPE, encoding="utf-8"
-            )
+            self._process = subprocess.Popen(words, encoding="utf-8", **pipes)
         except OSError as error:
             raise RegistryError(
                 f"{self.version}: {self.python} cannot be started ({error.strerror}). Name the "
@@ -91,8 +90,6 @@ class Relay:
         """Return the version's map of a surface."""
         if self._process is None:
             self.start()
-        assert self._process is not None
-        assert self._process.stdin is not None
         for name, array in (("V", mesh.V), ("F", mesh.F)):
             np.save(self._exchange / f"{name}.npy", array)
         self._process.stdin.write(f"{self._exchange}\n")
@@ -114,14 +111,11 @@ class Relay:
 
     def _said(self) -> dict[str, Any]:
         """Return the next answer of the process."""
-        assert self._process is not None
-        assert self._process.stdout is not None
         line = self._process.stdout.readline()
         if not line:
             code = self._process.wait()
             raise RegistryError(f"{self.version}: {self.python} ended with code {code}.")
-        said: dict[str, Any] = json.loads(line)
-        return said
+        return dict(json.loads(line))
 
 
 def declared(number: int, relay: Relay) -> str:

@@ -8,12 +8,12 @@ V and F; it writes uv there, and answers with a line.
 from __future__ import annotations
 
 import importlib
-import importlib.util
 import json
 import os
 import sys
 import tomllib
 from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
 from pathlib import Path
 from typing import Any
 
@@ -31,10 +31,8 @@ class Packages:
         folder = self.folders.get(name)
         if folder is None:
             return None
-        inside = [str(folder)]
-        return importlib.util.spec_from_file_location(
-            name, folder / "__init__.py", submodule_search_locations=inside
-        )
+        file = folder / "__init__.py"
+        return spec_from_file_location(name, file, submodule_search_locations=[str(folder)])
 
 
 def solver_of(name: str, folder: str, plugins: list[str]) -> Any:
