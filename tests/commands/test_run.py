@@ -212,7 +212,8 @@ def test_a_folder_of_meshes_and_a_profile_can_be_named(cli, monkeypatch):
         "    globals()[f's{k}'] = declare(k, row)\n"
     )
     arguments = ("run", "-a", "cem", "--plugin", plugin, "--dry-run", "--json")
-    _, out, err = cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")
+    code, out, err = cli(*arguments, "--mesh-dir", "meshes", "--profile", "quick")
+    assert code == 0, err
     assert "made" not in err  # ahead, in other processes: only what is kept is
     data = json.loads(out)
     assert [cell["mesh"] for cell in data["cells"]] == ["a", "b", *(f"s{k}" for k in range(8))]
