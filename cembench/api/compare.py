@@ -262,16 +262,18 @@ def _versions(
             label: {"version": f"{label} ({path})", "python": str(path), "plugins": files}
             for label, path in env.items()
         }
+    labels, here = ("before", "after"), {"python": sys.executable}
+    if all(one.endswith(".py") for one in named):
+        return {
+            label: here | {"version": one, "plugins": tuple(map(_absolute, (*plugins, one)))}
+            for label, one in zip(labels, named, strict=True)
+        }
+    commits, inside = list(map(_commit, named)), _git("rev-parse", "--show-prefix")
     found: Versions = {}
-    for label, one in zip(("before", "after"), named, strict=True):
-        found[label] = {"version": one, "python": sys.executable}
-        if one.endswith(".py"):
-            found[label]["plugins"] = tuple(map(_absolute, (*plugins, one)))
-            continue
-        commit, inside = _commit(one), _git("rev-parse", "--show-prefix")
-        folder = stack.enter_context(_worktree(commit, place / label)) / inside
-        about = {"version": f"{one} ({commit[:12]})", "folder": str(folder)}
-        found[label] |= about | {"plugins": tuple(plugins)}
+    for label, ref, commit in zip(labels, named, commits, strict=True):
+        folder = str(stack.enter_context(_worktree(commit, place / label)) / inside)
+        about = {"version": f"{ref} ({commit[:12]})", "folder": folder, "plugins": tuple(plugins)}
+        found[label] = here | about
     return found
 
 

@@ -180,7 +180,7 @@ def by_island(figures: UvFigures) -> list[dict[str, Any]]:
     cut, total = figures.cut, figures.total
     images, areas = total(np.abs(figures.image_areas)), total(figures.areas)
     triangles = np.bincount(cut.island, minlength=cut.islands)
-    tiles = figures.tiles.view(np.float64).reshape(-1, 2).astype(int).tolist()
+    tiles = np.stack([figures.tiles.real, figures.tiles.imag], axis=1).astype(int).tolist()
     each = {
         "triangles": triangles,
         "surface_share": areas / areas.sum(),

@@ -8,10 +8,10 @@ millisecond for a small surface, alike for all versions.
 from __future__ import annotations
 
 import json
-import subprocess
 from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
+from subprocess import PIPE, Popen
 from typing import Any
 
 import numpy as np
@@ -70,9 +70,8 @@ class Relay:
         """
         asked = {"name": self.solver, "folder": self.folder, "plugins": self.plugins}
         words = [self.python, "-P", str(SERVER), json.dumps(asked)]
-        pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE}
         try:
-            self._process = subprocess.Popen(words, encoding="utf-8", **pipes)
+            self._process = Popen(words, encoding="utf-8", stdin=PIPE, stdout=PIPE)
         except OSError as error:
             raise RegistryError(
                 f"{self.version}: {self.python} cannot be started ({error.strerror}). Name the "
