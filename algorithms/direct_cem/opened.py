@@ -39,8 +39,6 @@ RINGS = (1, 2, 4)
 MAX_FOLDED = 0.01
 #: Circles as exact as this, and as far apart, do not meet.
 ROUND = 1e-6
-#: A repaired map with a mean angle error above so many degrees is compared with the last resort.
-POOR = 10.0
 
 
 def valid_with_holes(
@@ -59,8 +57,8 @@ def valid_with_holes(
     repair : bool
         Whether to do anything; if not, `own` is returned.
     last_resort : bool
-        Whether to take the map of :func:`opened_disk` where folds or crossing boundaries of `own`
-        cannot be repaired, or only to angles that are worse.
+        Whether to take the map of :func:`opened_disk` if `own` has folds or crossing boundaries
+        and it is the better map: they may stay, and a repair can cost angles.
 
     Returns
     -------
@@ -84,8 +82,6 @@ def valid_with_holes(
     extras["before_repair"] = figures(mesh, own, folded)
     with phase("folds"):
         cost = _cost(mesh, loops, repaired)
-    if cost < (0, False, False, POOR):
-        return repaired, extras
     opened = opened_disk(mesh, loops[1:])
     with phase("folds"):
         if _cost(mesh, loops, opened) < cost:
