@@ -159,6 +159,9 @@ def interim_check(
         lacks[label] = lack(state.task.cell, rounds[label], reference)
     # What a reference is measured for are the ratios of others to it.
     wanted = lacks | dict.fromkeys(partners.values(), 0.0)
+    for partner in set(partners.values()):
+        widest = max(lacks[label] for label in partners if partners[label] == partner)
+        lacks[partner] = min(lacks[partner], widest)
     more = next_look(number, options.most_rounds) - number
     costs = {label: more * state.price for label, state in states.items()}
     chosen: set[str] = set() if last else affordable(wanted, costs, partners, seconds_left)

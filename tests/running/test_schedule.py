@@ -87,6 +87,19 @@ def test_what_is_precise_drops_out_and_the_reference_stays_beside_the_rest(tmp_p
     assert [r.kernel_seconds for r in by_name["lscm"].outcome.rounds] == kernels[:7]
 
 
+def test_a_reference_is_precise_if_the_ratios_to_it_are(tmp_path):
+    speeds = np.random.default_rng(4).lognormal(0, 0.15, 40).repeat(2).tolist()
+
+    class Drifting(Invented):
+        def time(self, task, checked):
+            return Round(calls=(speeds.pop(),), uv_hash="h")
+
+    tasks = cells(("cem", "fdm"))
+    records = run_tasks(tasks, Store(tmp_path), Options(most_rounds=40), None, Drifting)
+    assert rounds_of(records) == {"cem": 7, "fdm": 7}
+    assert {record.outcome.ended for record in records} == {"precise"}
+
+
 def test_without_time_each_cell_has_one_round(tmp_path):
     records = run_tasks(cells(), Store(tmp_path), Options(budget=0), None, Invented)
     assert set(rounds_of(records).values()) == {1}
