@@ -12,6 +12,7 @@ from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
 from benchmarks.paper_models import Cells, cells, models, printed
 from benchmarks.qiem_picture import accepted, remembering
+from cembench.conformal.doubling import doubled, doubled_laplacian
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
@@ -29,7 +30,7 @@ def iterates(mesh: DiskMesh) -> list[Cells]:
     L = laplacian(mesh)
     with remembering() as tried:
         rules.qiem(mesh.fresh(), repair=False)
-    L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
+    L_double = doubled_laplacian(L, doubled(mesh))
     steps = []
     for S in accepted(L_double, tried):
         if S is not None:

@@ -16,6 +16,7 @@ from cembench.algorithms.cem import cem
 from benchmarks.measuring import png, progress
 from benchmarks.pages import Section
 from benchmarks.qiem_steps import MAX_STEPS, ruled
+from cembench.conformal.doubling import doubled, doubled_laplacian
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
@@ -64,7 +65,7 @@ def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict
             with ruled(FIRST=first, GROWTH=growth):
                 rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MAX_STEPS)
             ends[tolerance] = len(tried) - 1
-    L_double = rules.doubled_laplacian(L, rules.doubled(mesh))
+    L_double = doubled_laplacian(L, doubled(mesh))
     return list(_finished(mesh, L, accepted(L_double, tried))), ends
 
 
