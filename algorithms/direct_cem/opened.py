@@ -60,14 +60,14 @@ def valid_with_holes(
     repair : bool
         Whether to do anything; if not, `own` is returned.
     last_resort : bool
-        Whether to take the map of :func:`opened_disk` if `own` has folds or crossing boundaries
-        and it is the better map: they may stay, and a repair can cost angles.
+        Whether to compare the map with that of :func:`opened_disk` if `own` has folds or crossing
+        boundaries: they may stay, and a repair can cost angles.
 
     Returns
     -------
     z : complex (n,)
         The map with the fewest folds, then without crossing boundaries, then with round holes,
-        then with the least mean angle error.
+        then with the least mean angle error, where the opened disk must have a tenth less.
     extras : dict
         As for :func:`cembench.conformal.fold_repair.accepted_repair`. If the opened disk is the
         map, ``last_resort`` has ``opened_holes``, their number.

@@ -93,3 +93,22 @@ def test_a_long_tube_is_an_annulus_whose_radius_the_record_holds():
     assert result.extras["stopped"] == "annulus"
     assert is_valid(mesh, result.uv)
     assert min(circle.radius for circle in boundary_circles(mesh, result.uv)) < 1e-3
+
+
+@pytest.mark.parametrize("much_better", [False, True])
+def test_the_last_resort_must_gain_a_tenth_over_a_repaired_map(monkeypatch, much_better):
+    mesh = gallery.three_holes()
+    outer, holes = mesh.outer_and_holes()
+    good = direct_cem_holes(mesh).uv
+    inside = np.setdiff1d(np.arange(mesh.n), np.concatenate([outer, *holes]))
+    edge = np.median(np.abs(good[mesh.F[:, 1]] - good[mesh.F[:, 0]]))
+    worse = good.copy()
+    worse[inside] += 0.1 * edge * np.random.default_rng(4).standard_normal(len(inside))
+    opened = good if much_better else worse
+    monkeypatch.setattr("cembench.algorithms.direct_cem.opened.opened_disk", lambda *_: opened)
+    own = worse.copy()
+    own[inside[0]] = good[outer[0]]
+    uv, extras = valid_with_holes(mesh, (outer, *holes), own, repair=True, last_resort=True)
+    assert is_valid(mesh, uv)
+    assert extras["folded_before_repair"] > 0
+    assert ("last_resort" in extras) == much_better
