@@ -12,9 +12,8 @@ from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
 from benchmarks.paper_models import Cells, cells, models, printed
 from benchmarks.qiem_picture import accepted, remembering
-from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import laplacian
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 
@@ -27,10 +26,9 @@ NAMES = ("E_C", "mean", "SD")
 
 def iterates(mesh: DiskMesh) -> list[Cells]:
     """Return the figures of the map after each step of QIEM's flow, without repair of folds."""
-    L = laplacian(mesh)
+    L, _, L_double, _ = doubled_surface(mesh)
     with remembering() as tried:
         rules.qiem(mesh.fresh(), repair=False)
-    L_double = doubled_laplacian(L, doubled(mesh))
     steps = []
     for S in accepted(L_double, tried):
         if S is not None:

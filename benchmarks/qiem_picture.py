@@ -16,9 +16,8 @@ from cembench.algorithms.cem import cem
 from benchmarks.measuring import png, progress
 from benchmarks.pages import Section
 from benchmarks.qiem_steps import MAX_STEPS, ruled
-from cembench.conformal.doubling import doubled, doubled_laplacian
+from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.harmonic import harmonic_extension
-from cembench.conformal.laplacian import laplacian
 from cembench.conformal.metrics import all_metrics
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
@@ -58,14 +57,14 @@ def remembering() -> Iterator[list[Any]]:
 
 def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict[float, int]]:
     """Return E_C of the map after every factorisation, and how many each tolerance takes."""
-    L, ends = laplacian(mesh), {}
+    L, _, L_double, _ = doubled_surface(mesh)
+    ends = {}
     with remembering() as tried:
         for tolerance in sorted(TOLERANCES, reverse=True):  # the longest flow is remembered last
             tried.clear()
             with ruled(FIRST=first, GROWTH=growth):
                 rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MAX_STEPS)
             ends[tolerance] = len(tried) - 1
-    L_double = doubled_laplacian(L, doubled(mesh))
     return list(_finished(mesh, L, accepted(L_double, tried))), ends
 
 
