@@ -139,7 +139,7 @@ def cli(capsys, monkeypatch, tmp_path):
     workplace.mkdir()
     monkeypatch.chdir(workplace)
     monkeypatch.setenv("COLUMNS", "80")
-    monkeypatch.setattr("cembench.running.environment.usable_cores", lambda: 1)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
     monkeypatch.setattr("cembench.commands.app.app", _commands())
 
     def call(*arguments):

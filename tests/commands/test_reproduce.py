@@ -33,8 +33,8 @@ def one_model(cli, monkeypatch, tmp_path):
     )  # fmt: skip
     known = replace(load_registry(), datasets={"nefertiti": model})
     monkeypatch.setattr(registry, "_installed", lambda: known)
-    names = ["nefertiti-stand-in", "cowboy-hat-stand-in"]
-    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
+    # Not `surfaces_of`: a module first imported meanwhile would keep the replacement for good.
+    monkeypatch.setattr("cembench.results.profiles.models", lambda _: ["Nefertiti", "Cowboy Hat"])
     monkeypatch.setenv("CEMBENCH_CACHE", str(tmp_path / "cache"))
     with ModelsServer() as server:
         monkeypatch.setenv("CEMBENCH_DATA_URL", server.url)
@@ -66,8 +66,7 @@ def test_a_model_replaces_its_stand_in_and_all_is_reported(cli, one_model):
 
 
 def test_the_call_does_what_the_command_does(cli, one_model, monkeypatch):
-    names = ["nefertiti-stand-in"]
-    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
+    monkeypatch.setattr("cembench.results.profiles.models", lambda _: ["Nefertiti"])
     code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s", "--json")
     assert code == 0, err
     printed = json.loads(out)
@@ -88,8 +87,7 @@ def test_offline_no_server_is_asked_and_a_failed_cell_ends_with_1(cli, one_model
         return check(self, task)
 
     monkeypatch.setattr(CellTimer, "check", failing)
-    names = ["nefertiti-stand-in"]
-    monkeypatch.setattr("cembench.results.profiles.surfaces_of", lambda *_: names)
+    monkeypatch.setattr("cembench.results.profiles.models", lambda _: ["Nefertiti"])
     code, out, err = cli("reproduce", "-o", "here", "--offline", "--budget", "0s")
     assert code == 1
     assert one_model.asked == 0
