@@ -11,9 +11,7 @@ from cembench.algorithms import qiem as rules
 from benchmarks.measuring import progress
 from benchmarks.pages import Section, Table
 from benchmarks.paper_models import Cells, cells, models, printed
-from benchmarks.qiem_picture import accepted, remembering
-from cembench.conformal.doubling import doubled_surface
-from cembench.conformal.harmonic import harmonic_extension
+from benchmarks.qiem_picture import finished, remembering
 from cembench.core.parameterization import Parameterization
 from cembench.mesh.triangle_mesh import DiskMesh
 
@@ -26,15 +24,9 @@ NAMES = ("E_C", "mean", "SD")
 
 def iterates(mesh: DiskMesh) -> list[Cells]:
     """Return the figures of the map after each step of QIEM's flow, without repair of folds."""
-    L, _, L_double, _ = doubled_surface(mesh)
     with remembering() as tried:
         rules.qiem(mesh.fresh(), repair=False)
-    steps = []
-    for S in accepted(L_double, tried):
-        if S is not None:
-            uv = harmonic_extension(L, mesh.boundary, rules.boundary_on_circle(mesh, S))
-            steps.append(cells(mesh, Parameterization(uv)))
-    return steps
+    return [cells(mesh, Parameterization(z)) for z in finished(mesh, tried) if z is not None]
 
 
 def row(model: str, mesh: DiskMesh) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from benchmarks.qiem_steps import MAX_STEPS, ruled
 from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.harmonic import harmonic_extension
 from cembench.conformal.metrics import all_metrics
+from cembench.core.arrays import Complex
 from cembench.mesh.files import read_mesh
 from cembench.mesh.triangle_mesh import DiskMesh
 
@@ -57,7 +58,6 @@ def remembering() -> Iterator[list[Any]]:
 
 def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict[float, int]]:
     """Return E_C of the map after every factorisation, and how many each tolerance takes."""
-    L, _, L_double, _ = doubled_surface(mesh)
     ends = {}
     with remembering() as tried:
         for tolerance in sorted(TOLERANCES, reverse=True):  # the longest flow is remembered last
@@ -65,24 +65,20 @@ def flow(mesh: DiskMesh, first: float, growth: float) -> tuple[list[float], dict
             with ruled(FIRST=first, GROWTH=growth):
                 rules.qiem(mesh.fresh(), tolerance=tolerance, max_iterations=MAX_STEPS)
             ends[tolerance] = len(tried) - 1
-    return list(_finished(mesh, L, accepted(L_double, tried))), ends
+    return [math.nan if z is None else energy(mesh, z) for z in finished(mesh, tried)], ends
 
 
-def accepted(L_double: Any, tried: list[Any]) -> Iterator[Any]:
-    """Yield each trial that lowered the sphere's energy, None for the others."""
+def finished(mesh: DiskMesh, tried: list[Any]) -> Iterator[Complex | None]:
+    """Yield the disk map after each trial, None where the sphere's energy was not lowered."""
+    L, _, L_double, _ = doubled_surface(mesh)
     least = math.inf
     for S in tried:
-        energy = math.inf if S is None else float((S * (L_double @ S)).sum())
-        yield S if energy <= least else None
-        least = min(least, energy)
-
-
-def _finished(mesh: DiskMesh, L: Any, accepted: Iterator[Any]) -> Iterator[float]:
-    for S in accepted:
-        if S is None:
-            yield math.nan
-            continue
-        yield energy(mesh, harmonic_extension(L, mesh.boundary, rules.boundary_on_circle(mesh, S)))
+        on_sphere = math.inf if S is None else float((S * (L_double @ S)).sum())
+        if S is not None and on_sphere <= least:
+            least = on_sphere
+            yield harmonic_extension(L, mesh.boundary, rules.boundary_on_circle(mesh, S))
+        else:
+            yield None
 
 
 def qiem_picture(meshes: Sequence[Path]) -> Section:

@@ -2,8 +2,7 @@ import numpy as np
 import pytest
 from cembench.surfaces.hemi_ellipsoid import hemi_ellipsoid
 
-from cembench.conformal.doubling import doubled, doubled_laplacian
-from cembench.conformal.laplacian import laplacian
+from cembench.conformal.doubling import doubled_surface
 from cembench.conformal.planar import signed_areas
 from cembench.conformal.spherical import balanced, harmonic_around_triangle, most_regular_triangle
 from cembench.conformal.stereographic import to_plane, to_sphere
@@ -11,9 +10,8 @@ from cembench.conformal.stereographic import to_plane, to_sphere
 
 @pytest.fixture(scope="module")
 def closed():
-    mesh = hemi_ellipsoid(600, x=1.3)
-    double = doubled(mesh)
-    return double.on_both(mesh.V), double.F, doubled_laplacian(laplacian(mesh), double)
+    _, double, L_double, V = doubled_surface(hemi_ellipsoid(600, x=1.3))
+    return V, double.F, L_double
 
 
 def sides(points, triangle):
