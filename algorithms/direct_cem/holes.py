@@ -65,8 +65,8 @@ def direct_cem_holes(
     proportions of the start's if that has better angles and raises E_C by at most 1 % (`settled`).
     A surface with one hole whose radius stays below 1e-3 is mapped by its logarithm (`stopped`:
     "annulus"), since E_C in the disk does not see the far end of a tube. Folds are repaired with
-    the boundary fixed (`fold_repairs`); where one of the filled surface, with circles
-    cut out of it, is better, `last_resort` takes that.
+    the boundary fixed (`fold_repairs`); a map that had some gives way to a better one of the filled
+    surface, with circles cut out of it (`last_resort`).
     """
     L = laplacian(mesh, delaunay=delaunay)
     with phase("boundary"):

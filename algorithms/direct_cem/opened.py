@@ -39,8 +39,8 @@ RINGS = (1, 2, 4)
 MAX_FOLDED = 0.01
 #: Circles as exact as this, and as far apart, do not meet.
 ROUND = 1e-6
-#: The last resort replaces a map as valid as itself only if it has less than this share of its
-#: error: radii are further from the conformal ones than in a map with repaired folds.
+#: Of two equally valid maps the last resort's is taken only if its error is below this share of
+#: the other's: its radii are further from the conformal ones than those of a repaired map.
 GAIN = 0.9
 
 
@@ -67,7 +67,7 @@ def valid_with_holes(
     -------
     z : complex (n,)
         The map with the fewest folds, then without crossing boundaries, then with round holes,
-        then with the least mean angle error, where the opened disk must have a tenth less.
+        then with the least mean angle error; the opened disk must have a tenth less (`GAIN`).
     extras : dict
         As for :func:`cembench.conformal.fold_repair.accepted_repair`. If the opened disk is the
         map, ``last_resort`` has ``opened_holes``, their number.
