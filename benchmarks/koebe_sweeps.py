@@ -20,7 +20,7 @@ NEAR = 1.01
 LAYOUT = """
 | surface | triangles | holes | sweeps | E_C | mean angle error | SD | folds | iterations \
 | off circles before rounding |
-|---|---:|---:|---|---:|---:|---:|---:|---:|---:|
+|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|
 | {surface} | {faces:,} | {holes} | {sweeps} | {energy:.4f} | {mean:.2f} | {sd:.2f} | {folds:,} \
 | {iterations} | {off:.3f} |"""
 
