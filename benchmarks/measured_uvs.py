@@ -1,6 +1,6 @@
 """What seams buy: the UVs that public models come with, against the best maps of cembench.
 
-Of the public surfaces that are fetched (`cembench fetch --group corpus`), those whose files hold UVs.
+Of the public surfaces that `cembench fetch --group corpus` fetched, those whose files hold UVs.
 """
 
 from __future__ import annotations
