@@ -22,9 +22,6 @@ from cembench.results.stability import outlier_lines, scatter_words, stability_w
 if TYPE_CHECKING:
     from cembench.report.content.inspection import Inspection
 
-#: Verdicts whose claims are named in the count.
-_NAMED = ("does not hold here",)
-
 
 def findings(
     evidence: Evidence, inspections: Mapping[str, Inspection], claims: Sequence[Claim]
@@ -49,8 +46,7 @@ def findings(
         words = [(contest_words(one),) for one in contests] or [("No map to compare.",)]
         shown = contests[0]["best"] if contests else evidence.reference_label
         figures = contest_figures(contests[0]) if contests else []
-    about = [stability_words(evidence.records)]
-    about += [] if claims else [scatter_words(evidence.records)]
+    about = [stability_words(evidence.records), "" if claims else scatter_words(evidence.records)]
     return Findings(
         (*words, *((one,) for one in about if one)),
         tuple(outlier_lines(evidence.records)),
@@ -120,6 +116,6 @@ def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
         if claims_of:
             parts.append(f"{'; ' if len(parts) > 1 else ''}{len(claims_of)} ")
             parts.append(one if len(claims_of) == 1 else several)
-        for k, claim in enumerate(claims_of if verdict in _NAMED else ()):
+        for k, claim in enumerate(claims_of if verdict == "does not hold here" else ()):
             parts += [", " if k else ": ", claim]
     return (*parts, ".")

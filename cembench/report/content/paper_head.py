@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from cembench.report.content.claims import UNTESTED, under
 from cembench.report.content.evidence import Evidence
@@ -23,6 +23,9 @@ from cembench.report.given_tables import given_table
 from cembench.results.families import enough_rounds, rate_interval
 from cembench.results.records import MeshOrigin
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 #: Maximum number of rows.
 ROWS = 6
 #: The origins of surfaces that have columns, and their words.
@@ -34,7 +37,6 @@ _TONES: dict[str, Tone] = {
     **{"as printed": "good", "more than printed": "good", "less than printed": "doubtful"},
     **{"holds": "good", "holds in part": "doubtful", "does not hold here": "bad"},
 }
-_NO_INTERVAL = "too few for an interval"
 
 
 class Rate(NamedTuple):
@@ -49,30 +51,39 @@ def headline(evidence: Evidence) -> str:
     paper = evidence.paper
     rows = evidence.frame
     rows = rows[rows["main"] & rows["counted"] & rows["algorithm"].isin(paper.compared)]
-    rows = rows[(rows["solves"] == evidence.policies[0]) & (rows["paired"] > 0)]
-    if rows.empty or not paper.stated.get("rate"):
+    rows = rows[rows["paired"] > 0]
+    first, *others = evidence.policies
+    won, decided = _decided(rows, first)
+    if not (rows["solves"] == first).any() or not paper.stated.get("rate"):
         return ""
-    reference, others = paper.reference.upper(), [name.upper() for name in paper.compared]
-    won, lost = (int((rows["verdict"] == one).sum()) for one in ("slower", "faster"))
-    if not won + lost:
-        any_of = listed(others, "or")
-        start = f"The rounds are too few to say whether {reference} is faster than {any_of}."
-    elif not lost:
-        start = f"{reference} is faster than {listed(others)} wherever these rounds decide it"
-        start += f" ({won} of {len(rows)} comparisons)."
+    reference, names = paper.reference.upper(), [name.upper() for name in paper.compared]
+    if decided:
+        share = "all" if won == decided else f"{won} of the"
+        start = f"{reference} is faster than {listed(names)} in {share} {decided} comparisons "
+        start += "that these rounds decide."
     else:
-        start = f"{reference} is faster than {listed(others)} in {won} of the {won + lost} "
-        start += "comparisons that these rounds decide."
+        start = f"The rounds do not decide if {reference} is faster than {listed(names, 'or')}."
     parts = []
     for origin, on in origins_of(evidence).items():
         said: dict[str, list[str]] = {}
         for name in paper.compared:
-            rate = _rate(evidence, name, evidence.policies[0], origin)
+            rate = _rate(evidence, name, first, origin)
             if rate and rate.verdict in _TONES:
                 said.setdefault(rate.verdict, []).append(name.upper())
-        each = [f"{verdict} over {listed(names)}" for verdict, names in said.items()]
+        each = [f"{verdict} over {listed(slower)}" for verdict, slower in said.items()]
         parts += [f"{on}, its average speedup is {', '.join(each)}."] if each else []
+    for policy in others:
+        won, decided = _decided(rows, policy)
+        more = f"this is with {first}; with {policy}, {reference} is faster in {won} of {decided}."
+        parts += [more] if decided else []
     return " ".join([start, *(part[0].upper() + part[1:] for part in parts)])
+
+
+def _decided(rows: pd.DataFrame, policy: str) -> tuple[int, int]:
+    """Return how many comparisons the paper's algorithm wins, and how many are decided."""
+    held = rows.loc[rows["solves"] == policy, "verdict"]
+    won, lost = (int((held == one).sum()) for one in ("slower", "faster"))
+    return won, won + lost
 
 
 def origins_of(evidence: Evidence) -> dict[MeshOrigin, str]:
@@ -134,7 +145,7 @@ def _rate(
     text, wanted = f"{MEAN_RATE.of(rates):.1f}", MEAN_RATE.of(printed) if printed else None
     of_these = "" if wanted is None else f", printed {wanted:.1f}"
     if not interval or wanted is None:
-        return Rate(text + of_these, _NO_INTERVAL)
+        return Rate(text + of_these, "too few for an interval")
     side = "more than" if interval.low > wanted else "less than" if interval.high < wanted else "as"
     return Rate(f"{text} ({interval.low:.1f} to {interval.high:.1f}){of_these}", f"{side} printed")
 

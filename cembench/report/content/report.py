@@ -209,13 +209,11 @@ def facts(evidence: Evidence) -> list[tuple[str, str]]:
         ("threads", ", ".join(sorted({str(r.cell.threads) for r in evidence.records}))),
         ("backend", ", ".join(sorted({r.cell.backend for r in evidence.records}))),
     ]
-    if evidence.superseded:
-        older = len(evidence.superseded)
+    if older := len(evidence.superseded):
         rows.append(("left out", f"{older} older records of cells measured again"))
     used = {record.environment for record in evidence.records}
-    for key, machine in evidence.store.environments().items():
-        if key in used:
-            rows.append(("machine", _machine(machine)))
+    environments = evidence.store.environments()
+    rows += [("machine", _machine(about)) for key, about in environments.items() if key in used]
     rows.append(("report by", f"cembench {installed_version()}"))
     return rows
 
@@ -241,7 +239,7 @@ def not_ok(evidence: Evidence) -> Table | Text:
     """Return a table of cells that did not end ok or are missing; a sentence if there is none."""
     declared = own_tables()["not-ok"]
     table = declared_table(evidence, "not-ok")
-    held = evidence.superseded | evidence.by_key.keys()
+    held, cells = evidence.superseded | evidence.by_key.keys(), len(evidence.records)
     again = "requested but not finished: run the same `cembench run` again to resume"
     missing = tuple(
         tuple(map(words, (cell.mesh, cell.algorithm, cell.solves, "missing", again)))
@@ -249,11 +247,9 @@ def not_ok(evidence: Evidence) -> Table | Text:
         if cell.key not in held
     )
     if table is None and not missing:
-        return Text(f"All {len(evidence.records)} cells ended ok.")
+        return Text(f"All {cells} cells ended ok.")
     rows = table.rows if table else ()
-    title = (
-        f"{len(rows)} of {len(evidence.records)} cells did not end ok; {len(missing)} are missing"
-    )
+    title = f"{len(rows)} of {cells} cells did not end ok; {len(missing)} are missing"
     columns = tuple(column.heading for column in declared.columns)
     return Table("not-ok", title, columns, (*rows, *missing), declared.caption)
 
