@@ -22,6 +22,9 @@ from cembench.results.stability import outlier_lines, scatter_words, stability_w
 if TYPE_CHECKING:
     from cembench.report.content.inspection import Inspection
 
+#: Verdicts whose claims are named in the count.
+_NAMED = ("does not hold here",)
+
 
 def findings(
     evidence: Evidence, inspections: Mapping[str, Inspection], claims: Sequence[Claim]
@@ -116,6 +119,6 @@ def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
         if claims_of:
             parts.append(f"{'; ' if len(parts) > 1 else ''}{len(claims_of)} ")
             parts.append(one if len(claims_of) == 1 else several)
-        for k, claim in enumerate(claims_of if verdict == "does not hold here" else ()):
+        for k, claim in enumerate(claims_of if verdict in _NAMED else ()):
             parts += [", " if k else ": ", claim]
     return (*parts, ".")
