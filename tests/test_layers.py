@@ -124,6 +124,24 @@ def test_every_package_of_the_tree_is_installed():
     assert set(declared["packages"]) == there
 
 
+def test_every_data_file_of_the_packages_is_installed():
+    """A file that code reads beside itself is missed in an installation, never in the tree."""
+    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    installed = set()
+    for name, globs in patterns["package-data"].items():
+        start = next((e for e in ELSEWHERE if f"{name}.".startswith(f"{e}.")), "cembench")
+        inside = name[len(start) + 1 :].split(".") if name != start else []
+        folder = (ROOT / ELSEWHERE.get(start, start)).joinpath(*inside)
+        installed |= {file for glob in globs for file in folder.glob(glob)}
+    there = {
+        file
+        for folder in ("cembench", *ELSEWHERE.values())
+        for file in (ROOT / folder).rglob("*")
+        if file.is_file() and file.suffix not in (".py", ".pyc")
+    }
+    assert there - installed == set()
+
+
 @pytest.mark.parametrize("folder", ELSEWHERE.values())
 def test_rooms_at_the_edge_import_what_is_theirs_relatively(folder):
     """They have one name in the tree and another once installed."""
