@@ -113,26 +113,27 @@ def test_an_import_of_the_package_s_face_would_be_found(tmp_path):
     assert len(list(violations(layers(), tmp_path))) == 1
 
 
+def folders_of_packages():
+    """The folder of each package of the tree, by the name it has once installed."""
+    return {
+        ".".join([name, *init.parent.relative_to(ROOT / folder).parts]): init.parent
+        for name, folder in {"cembench": "cembench", **ELSEWHERE}.items()
+        for init in (ROOT / folder).rglob("__init__.py")
+    }
+
+
 def test_every_package_of_the_tree_is_installed():
     declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
     assert declared["package-dir"] == ELSEWHERE
-    there = set()
-    for name, folder in {"cembench": "cembench", **ELSEWHERE}.items():
-        for init in (ROOT / folder).rglob("__init__.py"):
-            inside = init.parent.relative_to(ROOT / folder).parts
-            there.add(".".join([name, *inside]))
-    assert set(declared["packages"]) == there
+    assert set(declared["packages"]) == set(folders_of_packages())
 
 
 def test_every_data_file_of_the_packages_is_installed():
     """A file that code reads beside itself is missed in an installation, never in the tree."""
-    patterns = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
-    installed = set()
-    for name, globs in patterns["package-data"].items():
-        start = next((e for e in ELSEWHERE if f"{name}.".startswith(f"{e}.")), "cembench")
-        inside = name[len(start) + 1 :].split(".") if name != start else []
-        folder = (ROOT / ELSEWHERE.get(start, start)).joinpath(*inside)
-        installed |= {file for glob in globs for file in folder.glob(glob)}
+    declared = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]
+    folders = folders_of_packages()
+    data = declared["package-data"]
+    installed = {file for name in data for one in data[name] for file in folders[name].glob(one)}
     there = {
         file
         for folder in ("cembench", *ELSEWHERE.values())
