@@ -1,9 +1,8 @@
-"""What of the paper holds on its own public models? From the records of a kept report."""
+"""What of the paper holds on its own public models? From a kept report."""
 
 from __future__ import annotations
 
 import csv
-import json
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,8 +10,7 @@ from typing import Any
 
 from benchmarks.cem_speedups import KEPT, POLICIES, rates
 from benchmarks.pages import Section, Table
-from cembench.report.content.printed_tables import MEAN_RATE, printed_rates
-from cembench.results.families import enough_rounds, rate_interval
+from cembench.report.content.claims import verdict_of
 from cembench.results.papers import find_paper
 
 #: Claims on maps that the table has besides speed, and what the report's test of them asks.
@@ -31,10 +29,14 @@ LAYOUT = """
 
 def readme_answer(*, report: Path = KEPT) -> Section:
     """Tabulate what of the paper holds on the models of its own that are public."""
-    with (report / "tables/claims-at-a-glance.csv").open(encoding="utf-8", newline="") as lines:
-        claims = list(csv.DictReader(lines))
-    table = Table([*_speeds(report), *_maps(claims)], LAYOUT)
+    claims = _rows(report, "claims-at-a-glance")
+    table = Table([_faster(report), *_speeds(report), *_maps(claims)], LAYOUT)
     return Section([table, _verdicts(claims)], "README.md")
+
+
+def _rows(report: Path, name: str) -> list[dict[str, str]]:
+    with (report / f"tables/{name}.csv").open(encoding="utf-8", newline="") as lines:
+        return list(csv.DictReader(lines))
 
 
 def _verdicts(claims: list[dict[str, str]]) -> str:
@@ -47,41 +49,39 @@ def _verdicts(claims: list[dict[str, str]]) -> str:
     failing = [claim for claim, verdict in decided.items() if "not hold" in verdict]
     named = f" ({'; '.join(failing)})" if failing else ""
     return (
-        f"Of all {len(claims)} claims, on these models where they could be tested there, "
+        f"Of all {len(claims)} claims, judged on these models where that is possible, "
         f"{counts['holds']} hold, {counts['holds in part']} hold in part, and {len(failing)} do "
         f"not{named}."
     )
 
 
-def _speeds(report: Path) -> Iterator[dict[str, Any]]:
-    """Yield whether CEM is faster, and its average rates of speedup with kept factorisations."""
-    paper = find_paper("cem")
-    known = {
-        name: [row for row in rates(report, name, "reuse") if row["origin"] == "model"]
-        for name in paper.compared
-    }
+def _faster(report: Path) -> dict[str, Any]:
+    """Return on how many models CEM is faster, with kept factorisations and without."""
+    compared = find_paper("cem").compared
     kept, anew = (
-        [row["verdict"] for name in known for row in rates(report, name, policy, "model")]
-        for policy in POLICIES
+        [
+            row["verdict"] == "slower"
+            for name in compared
+            for row in rates(report, name, one, "model")
+        ]
+        for one in POLICIES
     )
-    won = [verdicts.count("slower") for verdicts in (kept, anew)]
-    here = f"{won[0]} of {len(kept)}; factored anew {won[1]} of {len(anew)}"
-    verdict = "holds" if sum(won) == len(kept + anew) else "holds in part"
+    here = f"{sum(kept)} of {len(kept)}; factored anew {sum(anew)} of {len(anew)}"
+    verdict = verdict_of(sum(kept + anew), len(kept + anew))
     claim = "CEM is faster than QIEM, FDM and LDM"
-    yield {"claim": claim, "printed": "always", "here": here, "verdict": verdict}
-    for name, rows in known.items():
-        printed = MEAN_RATE.of(printed_rates(paper, name, [row["paper_row"] for row in rows]))
-        speedups = [float(row["speedup"]) for row in rows]
-        enough = enough_rounds([len(json.loads(row["ratios"] or "[]")) for row in rows])
-        ratios, families = [1 + one for one in speedups], [row["family"] for row in rows]
-        interval = rate_interval(ratios, families, log=False) if enough else None
-        text, verdict = f"{MEAN_RATE.of(speedups):.1f}", "too few rounds"
-        if interval:
-            text += f" ({interval.low:.1f} to {interval.high:.1f})"
-            more, less = interval.low > printed, interval.high < printed
-            verdict = "more" if more else "less" if less else "as printed"
-        claim = f"its average speedup over {name.upper()}, t / t_CEM - 1"
-        yield {"claim": claim, "printed": f"{printed:.1f}", "here": text, "verdict": verdict}
+    return {"claim": claim, "printed": "always", "here": here, "verdict": verdict}
+
+
+def _speeds(report: Path) -> Iterator[dict[str, Any]]:
+    """Yield the average rates of speedup with kept factorisations, from the head of the report."""
+    for row in _rows(report, "head"):
+        average, _, policy = row["claim"].partition(" (")
+        if policy == "reuse)":
+            models = next(cell for column, cell in row.items() if "models of the paper" in column)
+            verdict, _, rate = models.partition(": ")
+            here, _, printed = rate.partition(", printed ")
+            claim = f"its {average}, t / t_CEM - 1"
+            yield {"claim": claim, "printed": printed, "here": here, "verdict": verdict}
 
 
 def _maps(claims: list[dict[str, str]]) -> Iterator[dict[str, Any]]:
