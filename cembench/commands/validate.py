@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import Annotated, Any
 
 import typer
 
@@ -15,9 +15,6 @@ from cembench.commands.external import Command, Settings, declared_command
 from cembench.commands.from_api import Call, from_api
 from cembench.commands.options import Junit
 from cembench.core.errors import ParameterError
-
-if TYPE_CHECKING:
-    pass
 
 
 @app.command(
