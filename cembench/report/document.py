@@ -54,6 +54,9 @@ VERDICTS: Mapping[Verdict, tuple[str, str]] = {
     "not tested here": ("is not tested here", "are not tested here"),
 }
 
+#: The verdict whose claims are named where verdicts are counted.
+FAILING: Verdict = "does not hold here"
+
 #: Texts of a column longer than this many characters are broken into lines.
 LONG = 36
 #: Heading of the suspect maps at the head of a report.

@@ -16,14 +16,11 @@ from cembench.report.content.standings import (
     surfaces_words,
 )
 from cembench.report.declared import declared_table
-from cembench.report.document import VERDICTS, Claim, Figure, Finding, Findings, Sentence
+from cembench.report.document import FAILING, VERDICTS, Claim, Figure, Finding, Findings, Sentence
 from cembench.results.stability import outlier_lines, scatter_words, stability_words
 
 if TYPE_CHECKING:
     from cembench.report.content.inspection import Inspection
-
-#: Verdicts whose claims are named in the count.
-_NAMED = ("does not hold here",)
 
 
 def findings(
@@ -119,6 +116,6 @@ def verdicts_counted(claims: Sequence[Claim]) -> Sentence:
         if claims_of:
             parts.append(f"{'; ' if len(parts) > 1 else ''}{len(claims_of)} ")
             parts.append(one if len(claims_of) == 1 else several)
-        for k, claim in enumerate(claims_of if verdict in _NAMED else ()):
+        for k, claim in enumerate(claims_of if verdict == FAILING else ()):
             parts += [", " if k else ": ", claim]
     return (*parts, ".")
