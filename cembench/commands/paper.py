@@ -10,6 +10,7 @@ import typer
 from cembench.api.papers import check_paper
 from cembench.commands.app import app
 from cembench.commands.console import Json, fail, out, print_json
+from cembench.core.wording import counted
 
 
 @app.command(epilog="Example:  cembench paper check papers/mine")
@@ -31,8 +32,7 @@ def paper(
         from cembench.results.papers import find_paper
 
         found = find_paper(str(folder))
-        out.print(
-            f"{found.title}: {len(found.algorithms)} algorithms, {len(found.models)} models, "
-            f"{len(found.tables)} tables and {len(found.claims)} claims; nothing is wrong"
-        )
+        nouns = ("algorithm", "model", "table", "claim")
+        *most, last = (counted(len(getattr(found, f"{noun}s")), noun) for noun in nouns)
+        out.print(f"{found.title}: {', '.join(most)} and {last}; nothing is wrong")
     fail(wrong)

@@ -91,9 +91,7 @@ def test_installed_papers_have_nothing_wrong():
 def test_the_command_prints_what_is_wrong_and_ends_with_1(cli, folder):
     code, out, _ = cli("paper", "check", folder())
     assert code == 0
-    assert "3 algorithms, 1 models, 1 tables and 1 claims; nothing is wrong" in " ".join(
-        out.split()
-    )
+    assert "3 algorithms, 1 model, 1 table and 1 claim; nothing is wrong" in " ".join(out.split())
     code, _, err = cli("paper", "check", folder(cells=CELLS + "Egg,60,fast,1,2\n"))
     assert code == 1
     assert "line 3" in err

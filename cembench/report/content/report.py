@@ -323,7 +323,8 @@ def _tables(run: _Run) -> Section | None:
         if any(figure.column == "seconds" for figure in tables[number].figures):
             items += policies.work_tables(evidence)
     numbers = sorted(number for number, table in tables.items() if table.figures)
-    title = f"Tables {numbers[0]} to {numbers[-1]}" if numbers else ""
+    title = f"Tables {numbers[0]} to {numbers[-1]}" if numbers[1:] else ""
+    title = title or "".join(f"Table {number}" for number in numbers)
     return Section("tables", title, tuple(items)) if items else None
 
 
