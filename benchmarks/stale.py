@@ -65,10 +65,12 @@ def measured_seconds(report: str) -> float:
 
 
 def confirmed_words(how: Mapping[str, Any] | None) -> str:
-    """Return when a kept report was confirmed by a shorter run, and by how many cells."""
+    """Return when a kept report was confirmed by a shorter run, and by how much of it."""
     if how is None:
         return ""
-    return f"; confirmed {how['date']} at `{how['commit']}` by {how['cells']} cells"
+    verdicts = how["same_verdict"] + how["one_decides"]
+    by = f"{how['cells']} cells and {verdicts} verdicts"
+    return f"; confirmed {how['date']} at `{how['commit']}` by {by}"
 
 
 def stale(*, check: bool = False, refresh: bool = False) -> Section:
