@@ -24,10 +24,12 @@ SHARES = (10, 50, 90)
 
 
 def by_algorithm(report: Path) -> dict[str, list[dict[str, str]]]:
-    """Return the rows of maps to the disk or with a free boundary, by the algorithm's title."""
+    """Return the rows of disks' maps, to the disk or free, by the algorithm's title."""
     values = defaultdict(list)
-    for row in text_rows(report):
-        if row["target"] in TARGETS:
+    rows = list(text_rows(report))
+    disks = {row["mesh"] for row in rows if row["target"] == "disk"}
+    for row in rows:
+        if row["target"] in TARGETS and row["mesh"] in disks:
             values[row["title"]].append(row)
     return dict(values)
 
