@@ -20,8 +20,8 @@ from cembench.validation.alignment import distance
 RINGS = (8, 16, 32)
 FINE = 128
 DISK = {name: spec for name, spec in load_registry().algorithms.items() if spec.target == "disk"}
-#: Prescribes its boundary, so it is conformal only where symmetry makes that the right one.
-NOT_CONFORMAL = {"harmonic-circle"}
+#: They do not promise it: `harmonic-circle` is only where symmetry makes its boundary right.
+NOT_CONFORMAL = {name for name, spec in DISK.items() if not spec.conformal}
 #: Other weights, or the graph of the mesh alone: no limit on curved surfaces is promised.
 NOT_HARMONIC = {"harmonic-tutte", "mean-value", "circle-packing"}
 #: Explicit steps: too slow to converge on fine meshes within its iterations.
