@@ -151,6 +151,7 @@ def test_unknown_formats_are_told_what_is_known(surface, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.process
 def test_the_validator_of_khronos_finds_nothing(surface, seamed, tmp_path):
     npm, node = shutil.which("npm"), shutil.which("node")
     if npm is None or node is None:
