@@ -20,14 +20,13 @@ from cembench.validation.alignment import distance
 RINGS = (8, 16, 32)
 FINE = 128
 DISK = {name: spec for name, spec in load_registry().algorithms.items() if spec.target == "disk"}
-#: They do not promise it: `harmonic-circle` is only where symmetry makes its boundary right.
-NOT_CONFORMAL = {name for name, spec in DISK.items() if not spec.conformal}
 #: Other weights, or the graph of the mesh alone: no limit on curved surfaces is promised.
 NOT_HARMONIC = {"harmonic-tutte", "mean-value", "circle-packing"}
 #: Explicit steps: too slow to converge on fine meshes within its iterations.
 SLOW = {"gu-yau"}
 DISK = {name: spec for name, spec in DISK.items() if name not in NOT_HARMONIC | SLOW}
-CONFORMAL = sorted(set(DISK) - NOT_CONFORMAL)
+#: `harmonic-circle` is not: only where symmetry makes its boundary right.
+CONFORMAL = sorted(name for name, spec in DISK.items() if spec.conformal)
 #: Its fixed point converges more slowly on finer meshes: what its 20 iterations leave undone grows.
 TO_THE_END = {"cem": {"max_iterations": 2000, "tolerance": 1e-12}}
 #: What it holds while it corrects one pole is as far off as its start, so positions stay so.
