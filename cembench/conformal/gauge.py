@@ -64,7 +64,10 @@ def moved_to_gauge(uv: Complex, measure: Real) -> Complex:
 
 
 def middle_triangle(V: Real, F: Indices) -> Indices:
-    """Return the corners of the triangle nearest to the mean vertex; V is (n, 2 or 3)."""
+    """Return the corners of the triangle nearest to the mean vertex; V is (n, 2 or 3).
+
+    One whose corners lie on a line, to rounding, is passed over for the next.
+    """
     middle = 3 * V.mean(axis=0)
 
     def squared_distances(some: Indices) -> Real:
@@ -72,4 +75,12 @@ def middle_triangle(V: Real, F: Indices) -> Indices:
         off = a + b + c - middle
         return np.asarray(np.einsum("td,td->t", off, off))
 
-    return F[np.argmin(in_blocks(squared_distances, F))]
+    far = in_blocks(squared_distances, F)
+    for _ in range(len(F)):
+        nearest = np.argmin(far)
+        u, v = V[F[nearest, 1:]] - V[F[nearest, 0]]
+        lengths, product = np.dot(u, u) * np.dot(v, v), np.dot(u, v)
+        if not lengths - product**2 <= np.finfo(np.float64).eps * lengths:
+            break
+        far[nearest] = np.inf
+    return F[nearest]

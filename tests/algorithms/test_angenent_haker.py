@@ -36,6 +36,15 @@ def test_the_boundary_is_that_of_the_linear_map_whatever_vertex_is_pinned():
         assert abs(f / f[0] - found / found[0]).max() < 1e-9
 
 
+def test_a_triangle_without_height_in_the_middle_is_passed_over_for_the_next():
+    V = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [1, 1, 0], [1.5, 1.5, 0]])
+    F = np.array([[4, 5, 2], [0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]])
+    corners, values = pole(V, F)
+    assert set(corners) == {1, 2, 4}
+    assert np.isfinite(values).all()
+    np.testing.assert_array_equal(pole(V[:, :2], F)[0], corners)
+
+
 def test_the_natural_boundary_of_a_flat_disk_is_a_circle_and_its_map_converges():
     coarse, fine = (
         all_metrics(mesh, angenent_haker(mesh).uv) for mesh in map(flat_disk, (500, 2000))
