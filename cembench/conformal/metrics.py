@@ -402,7 +402,7 @@ class Metric:
 #: All metrics of a map, in the order of tables; a new metric is added here and nowhere else.
 METRICS: tuple[Metric, ...] = (
     Metric(
-        "conformal_energy", "conformal energy", "E_C", "", ".4f", ".6f",
+        "conformal_energy", "conformal energy", "E_C", "", "z.4f", "z.6f",
         "E_C = E_D - A (Eq. 7); 0 for a conformal map",
         lambda f: f.energy - f.area, shown="overview",
     ),
@@ -457,7 +457,7 @@ METRICS: tuple[Metric, ...] = (
         lambda f: float(f.beltrami.max()), shown="page",
     ),
     Metric(
-        "common_gauge_energy", "E_C, common gauge", "E_C, gauge", "", ".4f", ".6f",
+        "common_gauge_energy", "E_C, common gauge", "E_C, gauge", "", "z.4f", "z.6f",
         "E_C of a disk map after the Moebius map that brings its area-weighted mean to 0",
         lambda f: f.centred_energy, shown="page",
     ),

@@ -43,7 +43,7 @@ from cembench.mesh.side_lengths import loop_width
 Loops = Sequence[Indices]
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class TriangleMesh:
     """An oriented 2-manifold triangulation in space.
 
@@ -70,8 +70,8 @@ class TriangleMesh:
     >>> import cembench
     >>> V = [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]]
     >>> tetrahedron = cembench.TriangleMesh(V, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
-    >>> tetrahedron.n, tetrahedron.m, len(tetrahedron.loops)
-    (4, 4, 0)
+    >>> tetrahedron, len(tetrahedron.loops)
+    (<TriangleMesh mesh: 4 vertices, 4 triangles>, 0)
     """
 
     V: Real
@@ -159,6 +159,9 @@ class TriangleMesh:
         """Raise if the surface is not of this class; return notices for the user."""
         return ()
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} {self.name}: {self.n:,} vertices, {self.m:,} triangles>"
+
     def fresh(self) -> Self:
         """Return the mesh without anything derived from it, as a timed call receives it."""
         return self.trusted(self.V, self.F, self.name, self.notices)
@@ -182,10 +185,8 @@ class TriangleMesh:
     @cached_property
     def interior(self) -> Indices:
         """Indices i of the vertices on no boundary loop, ascending."""
-        inside = np.ones(self.n, dtype=bool)
-        for loop in self.loops:
-            inside[loop] = False
-        return np.flatnonzero(inside)
+        none = self.F[:0, 0]  # a closed surface has no loops
+        return np.flatnonzero(~marked(self.n, np.concatenate([none, *self.loops])))
 
     @cached_property
     def hash(self) -> str:
@@ -196,7 +197,7 @@ class TriangleMesh:
         return digest.hexdigest()
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class DiskMesh(TriangleMesh):
     """A simply connected surface with boundary: one boundary loop, Euler characteristic 1.
 
@@ -237,7 +238,7 @@ class DiskMesh(TriangleMesh):
         return _check_planar(F, len(V), loops, [_holes(V, loops)] if len(loops) > 1 else [])
 
 
-@dataclass(frozen=True, eq=False, init=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class HoledMesh(TriangleMesh):
     """A multiply connected surface of genus zero: an outer boundary and at least one hole.
 
