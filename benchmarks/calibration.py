@@ -53,9 +53,7 @@ def _recipe(varied: str, rounds: int = 8, **start: float) -> Recipe:
 _SMOOTHER, _ROUGHER = "jag smooth even", "jag gain non_delaunay"
 RECIPES: dict[str, Recipe] = {
     "nefertiti-stand-in": _recipe(_SMOOTHER, jag=0.2, smooth=12, even=0.5, cut=0.5),
-    "cowboy-hat-stand-in": _recipe(
-        "smooth gain non_delaunay", smooth=0.4, gain=0.8, non_delaunay=0.16
-    ),
+    "cowboy-hat-stand-in": _recipe(_ROUGHER, jag=0.05, gain=0.6, non_delaunay=0.15),
     "chinese-vase-stand-in": _recipe(_ROUGHER, jag=0.4, non_delaunay=0.11, gain=1.7),
     "bourbon-bottle-stand-in": _recipe(
         "jag smooth non_delaunay", jag=0.02, smooth=6, non_delaunay=0.2

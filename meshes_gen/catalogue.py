@@ -64,13 +64,6 @@ BODIES: Mapping[str, Callable[[int], Body]] = {
     "knit-cap-man-stand-in": knit_cap_man_body,
 }
 
-#: Revisions of changed solids: only their cached surfaces are made again.
-REVISIONS = {
-    "cowboy-hat-stand-in": 1,
-    "ho-pouting-face-stand-in": 1,
-    "liu-pouting-face-stand-in": 1,
-}
-
 
 def stand_in(
     name: str, faces: int | None = None, *, seed: int = 0, levers: Levers | None = None
@@ -95,7 +88,7 @@ def stand_in(
     def make() -> DiskMesh:
         return hardened(body_mesh(name, count, seed, used.cut), used, seed)
 
-    return cached(DiskMesh, name, _content(name, count, seed, used), make)
+    return cached(DiskMesh, name, _content(count, seed, used), make)
 
 
 def body_mesh(name: str, faces: int, seed: int = 0, cut: float = 0.0) -> DiskMesh:
@@ -104,15 +97,14 @@ def body_mesh(name: str, faces: int, seed: int = 0, cut: float = 0.0) -> DiskMes
     return mesh_of(DiskMesh, trimmed(body, cut), faces, boundary, name=name)
 
 
-def _content(name: str, faces: int, seed: int, levers: Levers) -> dict[str, Any]:
+def _content(faces: int, seed: int, levers: Levers) -> dict[str, Any]:
     """Return everything that determines the shape of a stand-in."""
-    content = {
+    return {
         "faces": faces,
         "seed": seed,
         "levers": asdict(levers),
         "remeshing_filter": has_remeshing_filter(),
     }
-    return content | {"revision": REVISIONS[name]} if name in REVISIONS else content
 
 
 #: Person and expression of each stand-in that is a face.
@@ -168,7 +160,7 @@ def _registered(name: str) -> Callable[..., DiskMesh]:
         return stand_in(name, faces, seed=seed, levers=levers)
 
     def kept(faces: int, *, seed: int, **levers: Any) -> Path:
-        return place_of(name, _content(name, faces, seed, Levers(**levers)))
+        return place_of(name, _content(faces, seed, Levers(**levers)))
 
     make.__name__ = make.__qualname__ = name.replace("-", "_")
     make.__doc__ = BODIES[name].__doc__ or f"A procedural stand-in for the model {row.model}."

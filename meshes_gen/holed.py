@@ -16,7 +16,7 @@ from .faces import HO, face_body, mask
 from .head import NEUTRAL, Head
 from .implicit import Body, ellipsoid, sphere
 from .levers import with_levers
-from .remesh import edge_length, has_remeshing_filter, mesh_of
+from .remesh import Shape, edge_length, has_remeshing_filter, mesh_of
 from .rows import ROWS
 
 #: Polar angle of the cap's rim, of the holes' centres, and the holes' radius; degrees.
@@ -70,7 +70,8 @@ def holed_cap(
     area = 2 * np.pi * (1 - np.cos(np.deg2rad(CAP)))
     area -= holes * 2 * np.pi * (1 - np.cos(np.deg2rad(HOLE)))
     boundary = round(rims / edge_length(area, faces))
-    return _made("holed-cap", body, faces, boundary, holes=holes)
+    mesh = _made("holed-cap", body, faces, boundary, holes=holes)
+    return mesh.moved(Shape(body, 1e-3).nearest(mesh.V, mesh.F, 1e-3, rounds=2))
 
 
 @surface_family(

@@ -26,6 +26,7 @@ from .local_operations import (
     delaunay_flips,
     edges_of,
     mean_of_neighbours,
+    on_grid,
     vertex_normals,
 )
 from .remesh import break_delaunay, flip_ears
@@ -166,7 +167,7 @@ def _smoothed(V: Real, F: Indices, over: float, even: float = 0.0) -> Real:
     """
     ends = edges_of(F, len(V)).ends
     edge = float(np.linalg.norm(V[ends[:, 0]] - V[ends[:, 1]], axis=1).mean())
-    return _filtered(V, V, F, over * edge * (_curvature(V, F) ** even if even else 1.0))
+    return on_grid(_filtered(V, V, F, over * edge * (_curvature(V, F) ** even if even else 1.0)))
 
 
 def _filtered(X: Real, V: Real, F: Indices, length: Real | float) -> Real:
@@ -226,7 +227,7 @@ def _centred(V: Real, F: Indices, loop: Indices) -> Real:
         curve = np.tile(V[loop], (3, 1))
         slide = np.zeros_like(V)
         slide[loop] = np.stack([np.interp(goal, turns, x) for x in curve.T], axis=1) - V[loop]
-        V = V + _filtered(slide, V, F, REACH * float(np.linalg.norm(slide, axis=1).max()))
+        V = on_grid(V + _filtered(slide, V, F, REACH * float(np.linalg.norm(slide, axis=1).max())))
     return V
 
 

@@ -34,6 +34,7 @@ from .local_operations import (
     edges_of,
     flip,
     mean_of_neighbours,
+    on_grid,
     quads_of,
     split,
     subdivide,
@@ -200,7 +201,7 @@ def cut(
         ):
             k = (sa == pattern[0]) & (sb == pattern[1]) & (sd == pattern[2])
             pieces += [np.stack(corners, axis=1) for corners in triangles(a[k], b[k], d[k])]
-    V, F = compact(np.concatenate([V, new]), np.concatenate(pieces))
+    V, F = compact(on_grid(np.concatenate([V, new])), np.concatenate(pieces))
     return largest_piece(V, F)
 
 
@@ -227,7 +228,11 @@ class Shape:
         return to_curve(self.body.f, self.body.keep, p, self.step, reach)
 
     def project(self, V: Real, F: Indices, reach: float, rounds: int = 3) -> Real:
-        """Return all vertices projected back, none moving by more than `reach` per round."""
+        """Return all vertices projected back, a round by `reach` at most, and put on the grid."""
+        return on_grid(self.nearest(V, F, reach, rounds))
+
+    def nearest(self, V: Real, F: Indices, reach: float, rounds: int) -> Real:
+        """Return all vertices projected back, as near as the rounds bring them."""
         rim = boundary_mask(F, len(V))
         V = V.copy()
         V[~rim] = to_surface(self.body.f, V[~rim], self.step, reach, rounds)
@@ -268,7 +273,8 @@ class Sizes:
     def at(self, p: Real) -> Real:
         """Return the target length at points (k, 3)."""
         d, _ = self._tree.query(p)
-        return self.inside + (self.rim - self.inside) * np.exp(-d / self._reach)
+        # Not exp, whose last digit depends on the processor.
+        return self.inside + (self.rim - self.inside) / (1 + d / self._reach) ** 2
 
 
 def resize(V: Real, F: Indices, shape: Shape, sizes: Sizes) -> tuple[Real, Indices]:
@@ -492,8 +498,8 @@ def mesh_of(
 def break_delaunay(V: Real, F: Indices, seed: int, share: float) -> Indices:
     """Flip edges, chosen by `seed`, until about `share` of the interior ones are not Delaunay.
 
-    Mild cases first, as in scanned meshes: the two angles opposite to the edge sum to slightly more
-    than 180 degrees.
+    Mild cases, as in scanned meshes: the two angles opposite to the edge sum to slightly more than
+    180 degrees. An edge's chance is that of its ends, so that one edge more elsewhere changes none.
     """
     rng = np.random.default_rng(seed)
     n = len(V)
@@ -508,9 +514,10 @@ def break_delaunay(V: Real, F: Indices, seed: int, share: float) -> Indices:
         rim = edges.rim(n)
         mild = (weight >= 0) & (flipped < -1e-3) & (flipped > -0.8) & ~quads.folds(V)
         mild &= ~rim[quads.p] & ~rim[quads.q] & ~rim[quads.i] & ~rim[quads.j]
-        candidates = np.flatnonzero(mild)
-        if not len(candidates):
+        chance = rng.random(n)
+        order = np.argsort((chance[quads.i] + chance[quads.j]) % 1, kind="stable")
+        some = order[mild[order]][: max(1, round(0.8 * missing))]
+        if not len(some):
             break
-        some = rng.permutation(candidates)[: max(1, round(0.8 * missing))]
         F, _ = flip(F, quads.take(some), -weight[some], edges, n)
     return F

@@ -23,7 +23,7 @@ def relief(height, faces=800):
     return DiskMesh.from_arrays(V, mesh.F)
 
 
-@pytest.mark.parametrize("faces", [100, 3_000])
+@pytest.mark.parametrize("faces", [500, 3_000])
 def test_view_is_a_rotation(faces):
     surfaces = load_registry().surfaces.values()
     check_rotations([s for s in surfaces if s.kept is None and s.name != "ict-face"], faces)
