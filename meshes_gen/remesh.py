@@ -267,7 +267,7 @@ class Sizes:
     def __init__(self, V: Real, F: Indices, inside: float, rim: float) -> None:
         self.inside, self.rim = inside, rim
         self._tree = scipy.spatial.cKDTree(V[boundary_mask(F, len(V))])
-        # The length changes by at most a quarter of the distance.
+        # The length changes by at most half of the distance.
         self._reach = 4 * max(abs(rim - inside), 0.25 * min(rim, inside))
 
     def at(self, p: Real) -> Real:
