@@ -67,11 +67,11 @@ RECIPES: dict[str, Recipe] = {
     "ho-neutral-face-stand-in": _recipe(_SMOOTHER, jag=0.5, smooth=3, even=0.7),
     "left-hand-stand-in": _recipe(_SMOOTHER, jag=0.58, smooth=3, even=0.9),
     "statue-of-liberty-stand-in": _recipe(_ROUGHER, jag=0.2, gain=1.8, non_delaunay=0.03),
-    # No `even`, which would flatten noses: the four show one person.
-    "liu-neutral-face-stand-in": _recipe("jag smooth", jag=0.85, smooth=22),
-    "liu-smile-face-stand-in": _recipe("jag smooth", jag=0.85, smooth=22),
-    "liu-pouting-face-stand-in": _recipe("jag smooth", jag=0.85, smooth=22),
-    "liu-wry-face-stand-in": _recipe("jag smooth", jag=0.85, smooth=22),
+    # No `even`, which would flatten noses, and one smoothing: the four show one person.
+    "liu-neutral-face-stand-in": _recipe("jag", jag=0.85, smooth=20.5),
+    "liu-smile-face-stand-in": _recipe("jag", jag=0.85, smooth=20.5),
+    "liu-pouting-face-stand-in": _recipe("jag", jag=0.85, smooth=20.5),
+    "liu-wry-face-stand-in": _recipe("jag", jag=0.85, smooth=20.5),
     "isis-statue-stand-in": _recipe(_SMOOTHER, jag=0.5, smooth=5, even=0.7),
     "bimba-statue-stand-in": _recipe(_ROUGHER, jag=0.5, gain=1.1, non_delaunay=0.02),
     "knit-cap-man-stand-in": _recipe(_SMOOTHER, 5, jag=1.28, smooth=0.25, even=1.9),
