@@ -46,7 +46,7 @@ def contact_sheet() -> Section:
         axes.set_title(f"{name}\n{mesh.m:,} faces", fontsize=11, y=-0.12)
     figure.subplots_adjust(left=0, right=1, top=1, bottom=0.03, wspace=0, hspace=0.12)
     buffer = BytesIO()
-    figure.savefig(buffer, format="jpg", pil_kwargs={"quality": 75})
+    figure.savefig(buffer, format="jpg", dpi=65, pil_kwargs={"quality": 80})
     return Section([], files={"reports/surfaces/contact_sheet.jpg": buffer.getvalue()})
 
 
