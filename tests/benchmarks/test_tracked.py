@@ -74,7 +74,7 @@ def test_asv_measures_with_an_existing_environment(tmp_path):
     ).stdout.strip()
     ran = asv(
         *("run", "--config", str(file), "--python=same", f"--set-commit-hash={head}"),
-        *("--quick", "--bench", "Disks.track_folds|boundary_loops"),
+        *("--quick", "--bench", "algorithms.Disks.track_folds|boundary_loops"),
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert "cem" in ran.stdout
