@@ -23,7 +23,7 @@ def relief(height, faces=800):
     return DiskMesh.from_arrays(V, mesh.F)
 
 
-@pytest.mark.parametrize("faces", [500, 3_000])
+@pytest.mark.parametrize("faces", [100, 3_000])
 def test_view_is_a_rotation(faces):
     surfaces = load_registry().surfaces.values()
     check_rotations([s for s in surfaces if s.kept is None and s.name != "ict-face"], faces)
@@ -34,10 +34,16 @@ def test_view_of_a_sculpted_surface_is_a_rotation():
     check_rotations([s for s in load_registry().surfaces.values() if s.kept is not None], 100)
 
 
+def smallest(surface):
+    """The least number of triangles that a surface can be asked for."""
+    faces = next(p for p in surface.parameters if p.name == "faces")
+    return next(one.ge for one in faces.annotation.__metadata__[0].metadata if hasattr(one, "ge"))
+
+
 def check_rotations(surfaces, faces):
     assert len(surfaces) > 5
     for surface in surfaces:
-        R = view_rotation(surface.function(faces))
+        R = view_rotation(surface.function(max(faces, smallest(surface))))
         np.testing.assert_allclose(R @ R.T, np.eye(3), atol=1e-12)
         assert np.linalg.det(R) > 0
 
